@@ -1,4 +1,4 @@
-"""`svev calibrate`: interior orientations from images of a 3D frame."""
+"""`svev calibrate`: interior orientations from images of a 3D frame, measured already or found in pictures."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,11 +10,11 @@ from photogrammetry.procedures.calibration import calibrate as calibrate_network
 from photogrammetry.reports.adjusted import Wishes
 from photogrammetry.reports.procedures import calibration_lines, calibration_report, calibration_to_json
 from photogrammetry.reports.result_extras import named_points
+from rig.errors import BadInputError
 from svev.commands.networks.delivery import (
     CovarianceOption,
     DetectableOption,
     JsonOption,
-    OutputOption,
     ReportOption,
     as_record,
     deliver,
@@ -23,12 +23,42 @@ from svev.commands.networks.delivery import (
     with_extras,
     written,
 )
+from svev.commands.networks.layout import BoardOption, SquareOption, TargetOption, columns_and_rows
 
 
 def calibrate(
     context: typer.Context,
-    network: Annotated[Path, typer.Argument(help="network file (svev-network/1) with images of the frame")],
-    output: OutputOption,
+    network: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="NETWORK.json|FOLDER|LOG...",
+            help="network file (svev-network/1) with images of the frame; with --pictures: folders of pictures, each "
+            "named as its camera, or logs",
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="result file (svev-adjustment/1) to write; with --pictures the folder for calibration.json, "
+            "network.json and the report (calibration, if left out)",
+        ),
+    ] = None,
+    pictures: Annotated[bool, typer.Option("--pictures", help="find the targets of svev target in pictures")] = False,
+    board: BoardOption = "9x6",
+    square_mm: SquareOption = 30.0,
+    target_mm: TargetOption = 80.0,
+    distance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--distance", metavar="A,B,MM[,SIGMA]", help="measured distance of two corners, for the scale; repeatable"
+        ),
+    ] = None,
+    flat: Annotated[bool, typer.Option("--flat", help="the board is flat (glass, or checked with a ruler)")] = False,
+    camera: Annotated[
+        str | None, typer.Option("--camera", help="name of the camera, if its folder has another")
+    ] = None,
     detectable: DetectableOption = False,
     covariance: CovarianceOption = None,
     report: ReportOption = None,
@@ -39,8 +69,38 @@ def calibrate(
     Exit codes: 0 calibrated, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged, or refused
     because the images contradict each other.
 
-    Example: svev calibrate frame.json -o cameras.json --report calibration
+    Example: svev calibrate --pictures K1 K2 K3 -o calibration
     """
+    if pictures:
+        # Imported here: whoever has a network needs no image processing.
+        from analysis.targets.pattern import Layout  # noqa: PLC0415
+        from svev.commands.networks.calibrate_pictures import from_pictures  # noqa: PLC0415
+
+        if detectable or covariance or report:
+            raise BadInputError(
+                "--pictures writes its report into the folder of -o; for --detectable, --covariance or --report call "
+                "svev calibrate again with the network.json in it"
+            )
+        layout = Layout(*columns_and_rows(board), square_mm, target_mm)
+        from_pictures(
+            context, network, output or Path("calibration"), layout, distance or (), camera, flat=flat, as_json=as_json
+        )
+        return
+    if len(network) != 1 or output is None:
+        raise BadInputError("name one network file and -o RESULT.json, or pictures with --pictures")
+    _from_network(context, network[0], output, report, covariance, detectable=detectable, as_json=as_json)
+
+
+def _from_network(
+    context: typer.Context,
+    network: Path,
+    output: Path,
+    report: Path | None,
+    covariance: list[str] | None,
+    *,
+    detectable: bool,
+    as_json: bool,
+) -> None:
     refuse_overwriting(output, network)
     given = read_network(network)
     came_from = origin(context, network=network)

@@ -1,0 +1,130 @@
+"""From pictures of targets to calibrated cameras (paper, step 1): one bundle adjustment of all cameras' pictures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from analysis.targets.network_of import MeasuredDistance, Picture, network_of
+from analysis.targets.pattern import Layout, target_of
+from analysis.targets.verdict import CameraVerdict, print_notes, require_poses, verdicts
+from photogrammetry.adjustment.equations.unknowns import State, state_of
+from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
+from photogrammetry.network.diagnosis import NotConvergedError
+from photogrammetry.network.model import Network
+from photogrammetry.network.selection import only_points
+from photogrammetry.procedures.calibration import Calibration, calibrate
+from photogrammetry.procedures.lens_parameters import with_significant
+
+#: A target moved if its residuals are so many times the others', and others of its network shrink without it.
+_TIMES: Final = 4.0
+_TARGETS_LEFT: Final = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PictureCalibration:
+    """Calibrated cameras, and what led to them.
+
+    Attributes:
+        network: as it was adjusted, with start values.
+        calibration: the free adjustment.
+        pictures: those of the network.
+        verdicts: one for each camera.
+        notes: what was left out and why, and what the prints are like.
+    """
+
+    network: Network
+    calibration: Calibration
+    pictures: tuple[Picture, ...]
+    verdicts: tuple[CameraVerdict, ...]
+    notes: tuple[str, ...]
+
+
+def calibrate_pictures(
+    pictures: Sequence[Picture], layout: Layout, distances: Sequence[MeasuredDistance] = (), *, flat: bool = False
+) -> PictureCalibration:
+    """Calibrate the cameras of pictures of one rigid frame or board.
+
+    Args:
+        pictures: with their corners.
+        layout: what was printed.
+        distances: measured ones, for the scale of the frame.
+        flat: the board is flat.
+
+    Raises:
+        BadInputError: pictures that no calibration comes of; says which to take.
+        NotSolvableError, NotConvergedError, RefusedError: as the adjustment.
+    """
+    network, notes = network_of(pictures, layout, distances, flat=flat)
+    used = {image.name for image in network.images}
+    pictures = tuple(picture for picture in pictures if picture.name in used)
+    start = state_of(network)
+    require_poses(pictures, start.rotation, start.position - start.xyz.mean(axis=0))
+    network, moved = _without_moved(_with_better_start(network))
+    chosen, left_out = with_significant(network)
+    calibration = calibrate(chosen)
+    a = calibration.outcome.adjustment
+    return PictureCalibration(
+        chosen,
+        calibration,
+        pictures,
+        tuple(verdicts(a, pictures)),
+        (*notes, *moved, *left_out, *print_notes(a, layout, scaled=bool(distances))),
+    )
+
+
+def _with_better_start(network: Network) -> Network:
+    """The network adjusted by c alone of the interior orientations: from there the others converge, too."""
+    simple = replace(
+        network,
+        cameras=tuple(replace(one, estimate=("c",), sigma={"c": one.sigma["c"]}) for one in network.cameras),
+    )
+    try:
+        better = _at(simple, adjust_once(simple, state_of(simple)))
+    except NotConvergedError:
+        raise NotConvergedError(
+            "the pictures contradict each other: targets were moved on the frame between pictures, or a folder holds "
+            "pictures of two cameras or zooms; take them again with all targets fixed"
+        ) from None
+    cameras = (
+        replace(one, interior=found.interior) for one, found in zip(network.cameras, better.cameras, strict=True)
+    )
+    return replace(better, cameras=tuple(cameras))
+
+
+def _without_moved(network: Network) -> tuple[Network, list[str]]:
+    """The network, at its adjusted values, without targets that did not stay where they were on the frame."""
+    notes: list[str] = []
+    while True:
+        a = adjust_once(network, state_of(network))
+        targets = np.array([target_of(network.points[i].name) for i in a.problem.point])
+        v = np.square(a.image_residuals() / a.problem.sigma).sum(axis=1)
+        names = list(dict.fromkeys(targets.tolist()))
+        sizes = {name: float(np.sqrt(v[targets == name].mean())) for name in names}
+        worst = max(names, key=lambda name: sizes[name])
+        others = float(np.sqrt(v[targets != worst].mean())) if len(names) > _TARGETS_LEFT else np.inf
+        if sizes[worst] < _TIMES * others or worst == "board":
+            return _at(network, a), notes
+        stays = np.array([target_of(point.name) != worst for point in network.points])
+        network = only_points(network, stays)
+        notes.append(
+            f"target {worst[1:]} is left out: it moved on the frame between the pictures; fix all targets to one rigid "
+            "thing"
+        )
+
+
+def _at(network: Network, a: Adjustment) -> Network:
+    """The network with adjusted values to start from."""
+    state: State = a.state
+    return replace(
+        network,
+        cameras=tuple(
+            replace(one, interior=values) for one, values in zip(network.cameras, state.interior, strict=True)
+        ),
+        images=tuple(
+            replace(image, position=position, rotation=rotation)
+            for image, position, rotation in zip(network.images, state.position, state.rotation, strict=True)
+        ),
+        points=tuple(replace(point, xyz=xyz) for point, xyz in zip(network.points, state.xyz, strict=True)),
+    )

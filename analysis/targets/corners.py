@@ -1,0 +1,142 @@
+"""Measures corners where two black and two white fields meet, to hundredths of a pixel, with their covariance.
+
+Around such a corner q the grey values are fitted by two straight edges, blurred by a Gaussian of width s,
+
+    g(p) = b + g' (p - p0) + a erf(n1 (p - q) / (sqrt(2) s)) erf(n2 (p - q) / (sqrt(2) s)),
+
+with unknown q, directions of the normals n1 and n2, contrast a, background b with slope g', and s. The pattern is
+symmetric about q, so that blur and perspective do not shift it. Least squares give q and, by the residuals, its sigma.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erf
+
+from rig.arrays import Flags, Floats
+
+#: Radii of the window (px): below, a window holds too few pixels for nine unknowns; above, edges need not be straight.
+SMALLEST: Final = 3
+LARGEST: Final = 9
+_STEPS: Final = 25
+_ENOUGH: Final = 1e-4  # px, of a step
+_FIRST_BLUR: Final = 1.0  # px
+_BLUR: Final = (0.3, 4.0)  # px, in which a window shows edges at all
+_UNKNOWNS: Final = 9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """n measured corners.
+
+    Attributes:
+        xy: (n, 2) px, pixel frame: x right, y down, (0, 0) the centre of the top left pixel.
+        cofactor: (n, 2) variance of x and y for grey values of variance 1.
+        noise: (n,) rms of the grey values' residuals.
+        contrast: (n,) half the difference of white and black, signed as the start directions ask for.
+        blur: (n,) width s (px).
+        good: (n,) whether the fit converged within its window.
+    """
+
+    xy: Floats
+    cofactor: Floats
+    noise: Floats
+    contrast: Floats
+    blur: Floats
+    good: Flags
+
+
+def measure_corners(grey: NDArray[np.float32], start: Floats, edges: Floats, radius: int) -> Measured:
+    """Measure corners whose windows are of one size.
+
+    Args:
+        grey: (rows, columns).
+        start: (n, 2) px, at most a third of the radius off.
+        edges: (n, 2, 2) unit vectors along the two edges, into a white field between them.
+        radius: of the window, px.
+    """
+    side = np.arange(-radius, radius + 1)
+    dx, dy = (part.ravel().astype(float) for part in np.meshgrid(side, side))
+    inside = dx * dx + dy * dy <= radius * radius + 0.5
+    dx, dy = dx[inside], dy[inside]
+    middle = np.rint(start).astype(np.intp)
+    height, width = grey.shape
+    fits = np.all((middle >= radius) & (middle < np.array([width, height]) - radius), axis=1)
+    safe = np.where(fits[:, None], middle, np.array([width // 2, height // 2]))
+    values = grey[safe[:, 1, None] + dy.astype(np.intp), safe[:, 0, None] + dx.astype(np.intp)].astype(float)
+
+    low, high = np.percentile(values, (10, 90), axis=1)
+    angle = np.arctan2(edges[..., 1], edges[..., 0]) + np.array([0.5, -0.5]) * np.pi  # of the normals, into the field
+    angle = _inwards(angle, edges)
+    unknowns = np.column_stack(
+        (start - middle, angle, (high - low) / 2, (high + low) / 2, np.zeros((len(start), 2)),
+         np.full(len(start), np.log(_FIRST_BLUR)))
+    )  # fmt: skip
+    damping = np.full(len(start), 1e-3)
+    residual, slopes = _linearised(unknowns, values, dx, dy)
+    cost = np.einsum("np,np->n", residual, residual)
+    step = np.zeros_like(unknowns)
+    for _ in range(_STEPS):
+        normal = np.einsum("npi,npj->nij", slopes, slopes)
+        diagonal = np.einsum("nii->ni", normal)
+        damped = normal + (damping[:, None] * diagonal + 1e-9)[..., None] * np.eye(_UNKNOWNS)
+        step = -np.linalg.solve(damped, np.einsum("npi,np->ni", slopes, residual)[..., None])[..., 0]
+        tried = unknowns + step
+        tried[:, 8] = np.clip(tried[:, 8], *np.log(_BLUR))
+        next_residual, next_slopes = _linearised(tried, values, dx, dy)
+        next_cost = np.einsum("np,np->n", next_residual, next_residual)
+        better = next_cost <= cost
+        unknowns[better], residual[better], slopes[better] = tried[better], next_residual[better], next_slopes[better]
+        cost = np.where(better, next_cost, cost)
+        damping = np.where(better, damping / 5.0, np.minimum(damping * 5.0, 1e6))
+        if np.all(np.abs(step[:, :2]).max(axis=1) < _ENOUGH):
+            break
+    normal = np.einsum("npi,npj->nij", slopes, slopes)
+    cofactor = np.linalg.pinv(normal, hermitian=True)
+    moved = np.linalg.norm(unknowns[:, :2] - (start - middle), axis=1)
+    settled = np.abs(step[:, :2]).max(axis=1, initial=0.0) < 10.0 * _ENOUGH
+    return Measured(
+        middle + unknowns[:, :2],
+        np.stack((cofactor[:, 0, 0], cofactor[:, 1, 1]), axis=1),
+        np.sqrt(cost / (len(dx) - _UNKNOWNS)),
+        unknowns[:, 4],
+        np.exp(unknowns[:, 8]),
+        fits & settled & (moved < radius / 2.0),
+    )
+
+
+def _inwards(angle: Floats, edges: Floats) -> Floats:
+    """The normals' angles (n, 2), turned so that each points to the side of the other edge: a > 0 is white between."""
+    normal = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
+    towards = np.einsum("nij,nij->ni", normal, edges[:, ::-1])
+    return np.where(towards < 0.0, angle + np.pi, angle)
+
+
+def _linearised(unknowns: Floats, values: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
+    """Residuals (n, p) of the grey values, computed - observed, and derivatives (n, p, 9)."""
+    x, y = dx - unknowns[:, 0, None], dy - unknowns[:, 1, None]
+    blur = np.exp(unknowns[:, 8, None])
+    a = unknowns[:, 4, None]
+    parts = []
+    for column in (2, 3):
+        cos, sin = np.cos(unknowns[:, column, None]), np.sin(unknowns[:, column, None])
+        far = (x * cos + y * sin) / blur
+        parts.append((erf(far / np.sqrt(2.0)), np.sqrt(2.0 / np.pi) * np.exp(-0.5 * far * far), far, cos, sin))
+    (e1, s1, f1, c1, n1), (e2, s2, f2, c2, n2) = parts
+    computed = a * e1 * e2 + unknowns[:, 5, None] + unknowns[:, 6, None] * dx + unknowns[:, 7, None] * dy
+    by_first, by_second = a * s1 * e2, a * e1 * s2
+    ones = np.ones_like(computed)
+    slopes = np.stack(
+        (
+            -(by_first * c1 + by_second * c2) / blur,
+            -(by_first * n1 + by_second * n2) / blur,
+            by_first * (-x * n1 + y * c1) / blur,
+            by_second * (-x * n2 + y * c2) / blur,
+            e1 * e2, ones, ones * dx, ones * dy,
+            -(by_first * f1 + by_second * f2),
+        ),
+        axis=-1,
+    )  # fmt: skip
+    return computed - values, slopes

@@ -1,0 +1,49 @@
+"""`svev target`: targets to print, for calibrating cameras."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from analysis.targets.pattern import FIRST_SINGLE, LAST_SINGLE, Layout
+from analysis.targets.pdf import pdf
+from analysis.targets.sheets import board_page, target_pages
+from svev import console
+from svev.commands.networks.delivery import JsonOption
+from svev.commands.networks.layout import BoardOption, SquareOption, TargetOption, columns_and_rows
+
+_PRINT = (
+    "print at 100 % (not to fit the page), measure the line at the foot of each page, glue the board to a flat plate"
+)
+
+
+def target(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="folder for board.pdf and targets.pdf")],
+    board: BoardOption = "9x6",
+    square_mm: SquareOption = 30.0,
+    target_mm: TargetOption = 80.0,
+    targets: Annotated[
+        int, typer.Option("--targets", min=1, max=LAST_SINGLE - FIRST_SINGLE + 1, help="how many single targets")
+    ] = 24,
+    as_json: JsonOption = False,
+) -> None:
+    """Make targets to print: a ChArUco board, and single coded targets for a frame in space, as PDF of exact size.
+
+    Exit codes: 0 done, 2 bad input.
+
+    Example: svev target -o targets
+    """
+    columns, rows = columns_and_rows(board)
+    layout = Layout(columns, rows, square_mm, target_mm)
+    files = {"board.pdf": [board_page(layout)]}
+    files["targets.pdf"] = target_pages(layout, range(FIRST_SINGLE, FIRST_SINGLE + targets))
+    out.mkdir(parents=True, exist_ok=True)
+    for name, pages in files.items():
+        (out / name).write_bytes(pdf(pages))
+    counts = {name: len(pages) for name, pages in files.items()}
+    if as_json:
+        console.print_json({"folder": str(out), "pages": counts})
+        return
+    for name, count in counts.items():
+        console.say(f"{out / name}: {count} {'page' if count == 1 else 'pages'}")
+    console.say(_PRINT)

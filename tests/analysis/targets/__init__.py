@@ -1,0 +1,1 @@
+"""Tests of printed targets and of calibrations from pictures."""

@@ -1,0 +1,192 @@
+"""From corners to a calibration: what is found out, left out, and advised. Corners are computed, with errors."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.targets.calibrating import PictureCalibration, calibrate_pictures
+from analysis.targets.detection import Corner, Sight
+from analysis.targets.network_of import MeasuredDistance, Picture
+from analysis.targets.pattern import Layout
+from analysis.targets.report import report, to_json
+from photogrammetry.reports.document import as_html, as_text
+from rig.errors import BadInputError
+from tests.analysis.targets.drawn import (
+    Array,
+    DrawnCamera,
+    Sheet,
+    board_sheet,
+    corner_places,
+    frame_sheets,
+    looking,
+    seen_at,
+    stations,
+)
+
+_SIGMA = 0.01
+_CAMERA = DrawnCamera((480, 360), 600.0, 4.0, -3.0, -2e-7)
+_MIDDLE = np.array([0.0, 0.0, -200.0])
+
+
+def _pictures(
+    poses: Sequence[tuple[Array, Array]],
+    places: Callable[[int], dict[str, Array]],
+    camera: DrawnCamera = _CAMERA,
+    name: str = "K1",
+    sigma: float = _SIGMA,
+) -> list[Picture]:
+    random = np.random.default_rng(4)
+    pictures = []
+    for n, pose in enumerate(poses):
+        seen = seen_at(camera, *pose, places(n))
+        corners = {key: _corner(at + random.normal(0.0, sigma, 2), sigma) for key, at in seen.items()}
+        codes = dict.fromkeys({int(key[1:-1]) for key in corners if key.startswith("T")}, np.zeros((4, 2)))
+        pictures.append(Picture(name, f"{name}/{n}", Sight(camera.size, corners, codes, (), mirrored=False, blur=0.8)))
+    return pictures
+
+
+def _corner(at: Array, sigma: float) -> Corner:
+    return Corner(float(at[0]), float(at[1]), sigma, sigma)
+
+
+def _frame() -> dict[str, Array]:
+    return corner_places(frame_sheets())
+
+
+def _calibrated(pictures: Sequence[Picture], *distances: MeasuredDistance, flat: bool = False) -> PictureCalibration:
+    return calibrate_pictures(pictures, Layout(), distances, flat=flat)
+
+
+def _stations(sheets: Sequence[Sheet] = (), camera: DrawnCamera = _CAMERA) -> list[tuple[Array, Array]]:
+    middle, away = (_MIDDLE, 1250.0) if not sheets else (np.zeros(3), 270.0)
+    return stations(middle, away * camera.c / camera.size[0], np.random.default_rng(8), count=12)
+
+
+def test_a_frame_of_unknown_targets_gives_the_lens() -> None:
+    places = _frame()
+    made = _calibrated(_pictures(_stations(), lambda _: places))
+    a = made.calibration.outcome.adjustment
+    found = {p.name: p for p in a.parameters(0)[0]}
+    for name in ("c", "x0", "y0", "a1"):
+        assert abs(found[name].value - getattr(_CAMERA, name)) < 3.0 * found[name].sigma
+    assert 0.9 < a.ratio < 1.1
+    assert not {"a2", "b1", "b2"} & set(found)  # there is no such distortion, and it is not estimated
+    (verdict,) = made.verdicts
+    assert verdict.good
+    assert "good enough for 1:1000" in verdict.words
+    assert verdict.advice == ()
+    assert "a2 not significant, left out" in " ".join(made.notes)
+
+
+def test_the_board_is_not_taken_as_flat_unless_one_says_so() -> None:
+    bent = corner_places([board_sheet()])
+    bent = {name: at + np.array([0.0, 0.0, 4e-4 * at[0] ** 2]) for name, at in bent.items()}  # 4 mm at its sides
+    pictures = _pictures(_stations([board_sheet()]), lambda _: bent)
+    made = _calibrated(pictures)
+    a = made.calibration.outcome.adjustment
+    c = a.parameters(0)[0][0]
+    assert abs(c.value - _CAMERA.c) < 3.0 * c.sigma
+    assert any("the board bends by" in note for note in made.notes)
+    plane = corner_places([board_sheet()])
+    straight = _pictures(_stations([board_sheet()]), lambda _: plane)
+    free, flat = (_calibrated(straight, flat=said).calibration.outcome.adjustment for said in (False, True))
+    assert flat.parameters(0)[0][0].sigma < free.parameters(0)[0][0].sigma
+    assert np.abs(flat.state.xyz[:, 2]).max() < 0.1
+
+
+def test_a_measured_distance_gives_the_scale_and_tells_a_shrunken_print() -> None:
+    places = _frame()
+    shrunk = {name: 0.95 * at for name, at in places.items()}
+    poses = [(0.95 * position, rotation) for position, rotation in _stations()]
+    length = float(np.linalg.norm(shrunk["T100a"] - shrunk["T115c"]))
+    made = _calibrated(_pictures(poses, lambda _: shrunk), MeasuredDistance("T100a", "T115c", length, 0.3))
+    a = made.calibration.outcome.adjustment
+    at = {point.name: xyz for point, xyz in zip(a.network.points, a.state.xyz, strict=True)}
+    assert np.linalg.norm(at["T100a"] - at["T100b"]) == pytest.approx(0.95 * 80.0, abs=0.1)
+    assert any(note.startswith("the prints have 95.0% of their nominal size") for note in made.notes)
+    with pytest.raises(BadInputError, match="corner T199a is in fewer than two pictures"):
+        _calibrated(_pictures(poses, lambda _: shrunk), MeasuredDistance("T100a", "T199a", length, 0.3))
+
+
+def test_a_target_that_moved_is_named_and_left_out() -> None:
+    before, after = _frame(), _frame()
+    for letter in "abcd":
+        after[f"T106{letter}"] = after[f"T106{letter}"] + np.array([6.0, 2.0, 0.0])
+    made = _calibrated(_pictures(_stations(), lambda n: before if n < 6 else after))
+    moved = [note for note in made.notes if "moved on the frame" in note]
+    assert len(moved) == 1
+    assert moved[0].startswith("target 106 is left out")
+    c = made.calibration.outcome.adjustment.parameters(0)[0][0]
+    assert abs(c.value - _CAMERA.c) < 3.0 * c.sigma
+
+
+def test_cameras_of_one_frame_are_adjusted_together() -> None:
+    places = _frame()
+    other = replace(_CAMERA, size=(640, 480), c=1100.0, a1=1e-7)
+    pictures = _pictures(_stations(), lambda _: places)
+    pictures += _pictures(_stations(camera=other), lambda _: places, other, "K2")
+    made = _calibrated(pictures)
+    a = made.calibration.outcome.adjustment
+    for i, camera in enumerate((_CAMERA, other)):
+        c = a.parameters(i)[0][0]
+        assert abs(c.value - camera.c) < 3.0 * c.sigma
+    assert [verdict.camera for verdict in made.verdicts] == ["K1", "K2"]
+    assert set(to_json(made)["verdicts"]) == {"K1", "K2"}
+
+
+def test_pictures_that_all_look_alike_are_not_good_enough_and_it_says_what_to_do() -> None:
+    places = corner_places([board_sheet()])
+    ways = [(4.0, 0.0), (0.0, 4.0), (-4.0, 0.0), (0.0, -4.0), (3.0, 3.0), (0.0, 0.0)]
+    poses = [looking(np.zeros(3), 700.0, along=along, up=up, roll=0.0) for along, up in ways]
+    (verdict,) = _calibrated(_pictures(poses, lambda _: places, sigma=0.05)).verdicts
+    assert not verdict.good
+    assert "NOT good enough for 1:1000" in verdict.words
+    advice = " / ".join(verdict.advice)
+    for words in (
+        "take more pictures: 6 of 9",
+        "fill the picture: targets cover",
+        "from more to the side",
+        "turn the camera by 90 degrees for two more pictures: principal point and pose are not apart",
+    ):
+        assert words in advice
+
+
+def test_blurred_pictures_are_named() -> None:
+    places = _frame()
+    pictures = _pictures(_stations(), lambda _: places)
+    pictures[3] = replace(pictures[3], sight=replace(pictures[3].sight, blur=2.4))
+    (verdict,) = _calibrated(pictures).verdicts
+    assert verdict.advice == ("take K1/3 again: blurred (edges 2.4 px wide, usual 0.8)",)
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "1 picture shows"), (2, "2 pictures show")])
+def test_too_few_pictures_are_refused(count: int, words: str) -> None:
+    places = _frame()
+    with pytest.raises(BadInputError, match=f"{words} the targets|no corner is in two pictures"):
+        _calibrated(_pictures(_stations()[:count], lambda _: places))
+
+
+def test_pictures_of_one_pose_are_refused() -> None:
+    places = _frame()
+    pose = looking(_MIDDLE, 1600.0, along=10.0, up=5.0, roll=0.0)
+    with pytest.raises(BadInputError, match="all 5 pictures are of one pose"):
+        _calibrated(_pictures([pose] * 5, lambda _: places))
+
+
+def test_a_picture_of_other_targets_is_left_out() -> None:
+    places = _frame()
+    alone = {name.replace("T1", "T2"): at for name, at in places.items()}
+    made = _calibrated(_pictures(_stations(), lambda n: alone if n == 5 else places))
+    assert len(made.pictures) == 11
+    assert "K1/5 is left out: its targets cannot be joined" in made.notes[0]
+
+
+def test_the_report_has_verdict_coverage_residuals_and_grid() -> None:
+    places = _frame()
+    made = report(_calibrated(_pictures(_stations(), lambda _: places)))
+    text, page = as_text(made), as_html(made)
+    assert text.index("Verdict") < text.index("good enough for 1:1000") < text.index("Pictures")
+    for words in ("all corners of 12 pictures", "a square grid as the lens shows it", "mean residual in each"):
+        assert words in page

@@ -76,7 +76,7 @@ def test_errors_of_calibrations_agree_with_their_sigmas(kind: str) -> None:
 def _readable(corners: list[Array | None]) -> bool:
     """Whether a picture shows the whole square, as large as the documentation asks for, foreshortened a little."""
     there = [corner for corner in corners if corner is not None]
-    return len(there) == 4 and min(np.linalg.norm(there[i] - there[i - 1]) for i in range(4)) > _READABLE_PX
+    return bool(len(there) == 4 and min(np.linalg.norm(there[i] - there[i - 1]) for i in range(4)) > _READABLE_PX)
 
 
 def _errors(camera: DrawnCamera, found: dict[str, tuple[float, float]], correlation: Array) -> tuple[float, ...]:

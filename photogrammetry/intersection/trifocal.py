@@ -21,7 +21,6 @@ from rig.errors import BadInputError
 #: Image with interchanged skis in each hypothesis; -1: none. Interchanged in two images is the same as in the third.
 HYPOTHESES = (-1, 0, 1, 2)
 _FITS = 18.47  # chi-square, 4 degrees of freedom, 0.1 %
-_SURE = 0.99
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,24 +38,6 @@ class SideCheck:
     proposal: NDArray[np.int_]
     confidence: Floats
     fits: Flags
-
-    def words(self, instant: int, images: Sequence[str]) -> str:
-        """The result of one instant in words.
-
-        Args:
-            instant: index of the instant.
-            images: the three images' names.
-        """
-        if np.isnan(self.tests[instant]).any():
-            return "left and right not checked: measure both skis in all three images"
-        proposal, sure = int(self.proposal[instant]), self.confidence[instant] > _SURE
-        if not self.fits[instant]:
-            return "the ski lines of the three images do not belong together in any naming: measure them again"
-        if not sure:
-            return f"left and right cannot be told by these lines ({self.confidence[instant]:.0%}): compare by eye"
-        if proposal < 0:
-            return "left and right agree in all three images"
-        return f"left and right are interchanged in {images[proposal]}: interchange them there"
 
 
 def trifocal_tensor(cameras: Sequence[IdealCamera]) -> Floats:

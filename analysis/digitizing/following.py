@@ -12,8 +12,9 @@ import numpy as np
 from analysis.digitizing.desk import Desk
 from analysis.digitizing.effective import sigma_of
 from analysis.digitizing.journal import Entered, Key
-from analysis.digitizing.ski_following import Found, follow_skis
+from analysis.digitizing.ski_following import Found, follow_skis, refine_skis
 from analysis.digitizing.things import LINES
+from analysis.digitizing.tracking.motion import KnownMotion
 from analysis.digitizing.tracking.refining import refine_disc, refine_edge
 from analysis.digitizing.tracking.tracker import Tracker
 from analysis.digitizing.tracking.tracks import Automatic, Mark
@@ -25,6 +26,8 @@ from rig.errors import BadInputError
 
 _TO_CONTINUE: Final = frozenset({MarkSource.HAND, MarkSource.REFINED, MarkSource.TRACKED, MarkSource.AUTOMATIC})
 _BY_HAND: Final = frozenset({MarkSource.HAND, MarkSource.REFINED})
+
+_SAME_M_S: Final = 2.0  # standard deviation of the velocity of a ski against that of a point of the jumper's
 
 _Marks = dict[int, dict[str, Mark]]
 
@@ -59,10 +62,13 @@ def follow(desk: Desk, operator: str, order: TrackOrder) -> Tracked:
     desk.require_idle()
     session = desk.session(operator)
     desk.view(operator, order.pulse)  # refuses a pulse that is none of the log
+    if order.most == 0:
+        return refine(desk, operator, order)
     marks = session.everything()
     points = [thing for thing in order.things if thing not in LINES]
     lines = [thing for thing in order.things if thing in LINES]
     found = Found()
+    known: dict[str, KnownMotion] = {}
     starts = {thing: _marks_of(marks, thing, order.pulse) for thing in points}
     there = {thing: of for thing, of in starts.items() if of.get(order.pulse)}
     if there:
@@ -78,17 +84,42 @@ def follow(desk: Desk, operator: str, order: TrackOrder) -> Tracked:
                     for camera, place in images.items():
                         found.add(Key(pulse, camera, thing), place.xy, place.sigma)
             found.stopped[thing] = "; ".join(dict.fromkeys(track.stopped for track in of))
+            for track in of:
+                if track.velocity is not None:
+                    known[thing] = KnownMotion(track.velocity, _SAME_M_S)
     if lines:
-        follow_skis(desk, lines, marks, found, order)
+        follow_skis(desk, lines, marks, found, order, known)
     if not found.stopped:
         raise BadInputError(f"pulse {order.pulse}: none of these things is marked there: mark one, best in two images")
     kept = [
         (key, entered)
-        for key, entered in found.marks
+        for key, entered in found.marks.items()
         if (now := session.at(key.pulse).get(key)) is None or now.source is MarkSource.TRACKED
     ]
     changed = desk.put(operator, kept)
     pulses = {thing: sorted({key.pulse for key, _ in kept if key.thing == thing}) for thing in found.stopped}
+    return Tracked(revision=changed.revision, tracked=pulses, stopped=found.stopped)
+
+
+def refine(desk: Desk, operator: str, order: TrackOrder) -> Tracked:
+    """Find marked skis more exactly at one pulse, in all images that show them; keeps what was found by one action.
+
+    Raises:
+        BadInputError: no ski is named.
+        UnknownRecordingError: the log has no such pulse.
+        StateForbidsError: a recording runs, or the cameras are not oriented.
+        NoFitError: no oriented camera has a frame.
+        StorageError: the disk refuses; nothing was kept.
+    """
+    lines = [thing for thing in order.things if thing in LINES]
+    if not lines:
+        raise BadInputError("only skis are refined in all images at once: name one, or follow for a pulse or more")
+    marks, found = desk.session(operator).at(order.pulse), Found()
+    refine_skis(desk, marks, order.pulse, lines, found)
+    told = {(key.camera, key.thing) for key in found.marks}
+    more = [key for key in marks if (key.camera, key.thing) in told and key not in found.marks]
+    changed = desk.put(operator, found.marks.items(), more)
+    pulses = {line: [order.pulse] if any(key.thing == line for key in found.marks) else [] for line in lines}
     return Tracked(revision=changed.revision, tracked=pulses, stopped=found.stopped)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cameras.frames import camera_images
+from analysis.candidates.foreground.background import Background
 from analysis.measurements.model import Measurements
 from analysis.procedure.log_facts import log_facts
 from analysis.scene.static_image import StaticImage, static_images
@@ -67,6 +68,7 @@ class OpenedLog:
         self._lock = threading.Lock()
         self._frames: OrderedDict[int, tuple[dict[str, Grey], dict[str, NDArray[np.uint8]]]] = OrderedDict()
         self._static: dict[str, StaticImage] | None = None
+        self._backgrounds: dict[str, Background] | None = None
 
     @property
     def unmeasured(self) -> Measurements:
@@ -118,6 +120,18 @@ class OpenedLog:
             if self._static is None:
                 self._static = static_images(self.path)
             return self._static
+
+    def backgrounds(self) -> dict[str, Background]:
+        """The static scene of each camera, to compare its frames with.
+
+        Raises:
+            LogDamagedError: no frame can be read.
+        """
+        static = self.static()
+        with self._lock:
+            if self._backgrounds is None:
+                self._backgrounds = {name: Background(image) for name, image in static.items()}
+            return self._backgrounds
 
     def _read(self, pulse: int) -> tuple[dict[str, Grey], dict[str, NDArray[np.uint8]]]:
         with self._lock:

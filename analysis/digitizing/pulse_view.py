@@ -18,7 +18,7 @@ from analysis.digitizing.space import (
     stick,
 )
 from analysis.digitizing.things import LINES
-from analysis.digitizing.tracking.skis import as_two_points
+from analysis.digitizing.two_points import as_two_points
 from analysis.measurements.model import POINTS, PulseMeasurements
 from analysis.scene.camera_system import CameraSystem
 from rig.api.digitizing import (

@@ -1,6 +1,10 @@
-"""Follows skis through the pulses: they go along with their bindings, and the bars in the images say where they lie."""
+"""Follows skis through the pulses, both together as bars in space, and the bindings that stand on them.
 
-from collections.abc import Mapping, Sequence
+A binding without a marker looks like the rest of its ski: by its appearance alone it slips along it. Where the ski is
+seen, tail and tip say where its binding is, which was marked at the start.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -8,27 +12,25 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.digitizing.desk import Desk
+from analysis.digitizing.effective import sigma_of
 from analysis.digitizing.journal import Entered, Key
-from analysis.digitizing.things import LINES
-from analysis.digitizing.tracking.skis import SeenSki, SkiFinder
-from analysis.measurements.model import SIDES, ImageMeasurements, PulseMeasurements, SkiMeasurement
-from analysis.pulses.gross_errors import RISK
-from analysis.pulses.least_squares import adjust
-from analysis.pulses.skis import skis_of
+from analysis.digitizing.ski_starts import BINDINGS, SkiStart, ski_start, ski_views
+from analysis.digitizing.tracking.motion import KnownMotion
+from analysis.digitizing.tracking.ski_motion import PairBelief, PairMotion
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
+from analysis.ski_bars.bars import ExpectedBars
+from analysis.ski_bars.fitting import FittedBars, fit_bars
+from analysis.ski_bars.image_lines import ImageLine
 from rig.api.digitizing import MarkSource, MarkState, TrackOrder
 from rig.arrays import Floats
-from rig.clocks import UtcNs
 from rig.errors import NoFitError
-from rig.pulse import PulseNumber
 
-#: The binding on each ski, which goes along with it.
-_BINDINGS: Final = {"right ski": "P3", "left ski": "P4"}
-#: Images in which a ski must be found, if it was marked in more than one: from two follows a line in space.
-_FEWEST_IMAGES: Final = 2
-#: Three images control each other. Where fewer of those in which a ski was marked show it, nothing of it is kept.
-_CONTROLLED: Final = 3
+#: Probability of a sound pulse to contradict the motion before.
+_RISK: Final = 1e-4
 #: So many pulses in a row a ski may be missed before it has ended.
 _MISSED: Final = 3
+#: The shape of a ski does not change, but what hides its ends does, m.
+_SHAPE_M: Final = 0.003
 _FAR: Final = "it was tracked as far as was asked"
 
 _Marks = Sequence[tuple[Key, Entered]]
@@ -38,148 +40,246 @@ _Marks = Sequence[tuple[Key, Entered]]
 class Found:
     """What was followed so far, and why each thing ended."""
 
-    marks: list[tuple[Key, Entered]] = field(default_factory=list)
+    marks: dict[Key, Entered] = field(default_factory=dict)
     stopped: dict[str, str] = field(default_factory=dict)
 
-    def add(self, key: Key, xy: Floats, sigma: Floats) -> None:
+    def add(self, key: Key, xy: Floats, sigma: Floats, source: MarkSource = MarkSource.TRACKED) -> None:
         """A place that was found, px, with its standard deviations (2,)."""
         place = (round(float(xy[0]), 4), round(float(xy[1]), 4))
         scatter = (float(sigma[0]), float(sigma[1]))
-        self.marks.append((key, Entered(MarkState.MEASURED, place, scatter, MarkSource.TRACKED)))
+        self.marks[key] = Entered(MarkState.MEASURED, place, scatter, source)
 
 
-@dataclass(slots=True)
-class _InImage:
-    """A ski in one camera: as it was seen last, how far it has gone since, and how far it goes from pulse to pulse."""
+def refine_skis(desk: Desk, marks: Mapping[Key, Entered], pulse: int, lines: Sequence[str], found: Found) -> None:
+    """Find marked skis more exactly at a pulse; what is found takes the place of the marks.
 
-    seen: SeenSki
-    step: Floats = field(default_factory=lambda: np.zeros(2))
-    pace: Floats = field(default_factory=lambda: np.zeros(2))
-    missed: int = 0
+    Args:
+        desk: of the log.
+        marks: that stand at the pulse.
+        pulse: its number.
+        lines: names of the skis.
+        found: takes what is found, and why a ski is refused.
+
+    Raises:
+        StateForbidsError: the cameras are not oriented.
+        NoFitError: no camera has a frame.
+    """
+    system = desk.oriented()
+    start = ski_start(desk, system, marks, pulse, {})
+    fitted = _fitted(desk, system, pulse, start, start.expected, start.present)
+    for k, line in enumerate(BINDINGS):
+        if line not in lines:
+            continue
+        found.stopped[line] = "it was refined" if fitted.seen[k] else start.refused.get(line, _unseen(fitted, k, pulse))
+        for camera, of in fitted.lines.items():
+            if (seen := of[k]) is not None:
+                marked = any(key.camera == camera and key.thing == line for key in marks)
+                _put(found, pulse, camera, line, seen, MarkSource.REFINED if marked else MarkSource.TRACKED)
 
 
-def follow_skis(desk: Desk, lines: Sequence[str], marks: _Marks, found: Found, order: TrackOrder) -> None:
+def follow_skis(
+    desk: Desk, lines: Sequence[str], marks: _Marks, found: Found, order: TrackOrder, known: Mapping[str, KnownMotion]
+) -> None:
     """Follow skis from a pulse at which they are marked.
 
     Args:
         desk: of the log.
         lines: names of the skis; those that are not marked there are left out.
         marks: of the operator.
-        found: points that were followed, whose bindings show the way; takes what is found.
+        found: takes what is found, of the skis and of bindings that are asked for.
         order: where to begin, and how far to go.
+        known: of the motion of points that were followed before, by name.
     """
-    finder = SkiFinder(desk.log.static(), desk.log.facts.rate_hz)
-    ways = _ways([*marks, *found.marks])
-    skis: dict[str, dict[str, _InImage]] = {}
-    for line in lines:
-        skis[line] = _begun(desk, finder, line, marks, found, order.pulse)
-    pulse = order.pulse
-    for _ in range(order.most):
-        before, pulse = pulse, pulse + order.direction
-        open_ = {line: images for line, images in skis.items() if images and line not in found.stopped}
-        if not open_:
-            return
-        for line, images in open_.items():
-            for camera, ski in images.items():
-                ski.step = ski.step + _step(ways, line, camera, before, pulse, ski.pace)
-        for line, images in open_.items():
-            other = next((known for name, known in open_.items() if name != line), {})
-            _find(desk, finder, line, images, other, found, pulse)
-    for line, images in skis.items():
-        if images:
-            found.stopped.setdefault(line, _FAR)
-
-
-def _begun(desk: Desk, finder: SkiFinder, line: str, marks: _Marks, found: Found, pulse: int) -> dict[str, _InImage]:
-    """The ski in the images in which it is marked."""
-    places: dict[str, list[tuple[float, float]]] = {}
-    for key, entered in marks:
-        if key.thing == line and key.pulse == pulse and entered.xy is not None:
-            places.setdefault(key.camera, []).append(entered.xy)
-    images, begun, refusals = desk.log.frames(pulse), {}, []
-    for camera, xy in places.items():
-        if len(xy) > 1 and camera in images:
-            try:
-                begun[camera] = _InImage(finder.marked(camera, images[camera], np.array(xy)))
-            except NoFitError as error:
-                refusals.append(str(error))
-    if len(begun) < min(len(places), _FEWEST_IMAGES):
-        found.stopped[line] = "; ".join(refusals) or f"pulse {pulse}: a ski needs two points in an image"
-        return {}
-    return begun
-
-
-def _find(
-    desk: Desk, finder: SkiFinder, line: str, images: dict[str, _InImage], other: Mapping[str, _InImage], found: Found,
-    pulse: int,
-) -> None:  # fmt: skip
-    """Find a ski in the images of a pulse; after some in which that failed, it has ended."""
-    frames, now, refusals = desk.log.frames(pulse), {}, []
-    for camera, ski in images.items():
-        elsewhere = other.get(camera)
-        try:
-            now[camera] = finder.again(
-                camera,
-                frames[camera],
-                ski.seen,
-                ski.step,
-                ski.missed + 1,
-                None if elsewhere is None else elsewhere.seen.ends + elsewhere.step,
-            )
-        except KeyError:
-            refusals.append(f"{camera}: there is no frame")
-        except NoFitError as error:
-            refusals.append(str(error))
-    contradiction = _contradiction(desk, line, now)
-    if len(now) < min(len(images), _CONTROLLED) or contradiction is not None:
-        for ski in images.values():
-            ski.missed += 1
-        if max(ski.missed for ski in images.values()) > _MISSED:
-            found.stopped[line] = f"pulse {pulse}: {contradiction or '; '.join(refusals)}"
+    here = {key: entered for key, entered in marks if key.pulse == order.pulse}
+    lines = [line for line in lines if any(key.thing == line for key in here)]
+    if not lines:
         return
-    for camera, seen in now.items():
-        for vertex, place in enumerate(seen.xy):
-            found.add(Key(pulse, camera, line, vertex), place, np.array((seen.sigma, seen.sigma)))
-        last = images[camera]
-        pace = (seen.ends.mean(axis=0) - last.seen.ends.mean(axis=0)) / (last.missed + 1)
-        images[camera] = _InImage(seen, pace=pace)
-    for camera in images.keys() - now.keys():
-        images[camera].missed += 1
-        if images[camera].missed > _MISSED:
-            del images[camera]
-
-
-def _ways(marks: _Marks) -> dict[tuple[str, str, int], Floats]:
-    """Where each camera shows the bindings, by name, camera and pulse."""
-    return {
-        (key.thing, key.camera, key.pulse): np.array(entered.xy)
-        for key, entered in marks
-        if key.thing in _BINDINGS.values() and entered.xy is not None and entered.state is MarkState.MEASURED
-    }
-
-
-def _step(
-    ways: Mapping[tuple[str, str, int], Floats], line: str, camera: str, before: int, now: int, pace: Floats
-) -> Floats:
-    """How far a ski has gone in an image: as its binding did, or as it did before."""
-    first, last = (ways.get((_BINDINGS[line], camera, pulse)) for pulse in (before, now))
-    return pace if first is None or last is None else last - first
-
-
-def _contradiction(desk: Desk, line: str, skis: Mapping[str, SeenSki]) -> str | None:
-    """In words if the lines of three images do not meet in space; two planes always do."""
     system = desk.orienting.system
-    if system is None or len(skis) < _CONTROLLED:
-        return None
-    side = LINES[line]
-    images = {
-        camera: ImageMeasurements({}, {side: SkiMeasurement(ski.xy, np.full(2, ski.sigma))})
-        for camera, ski in skis.items()
-    }
-    measured = PulseMeasurements(PulseNumber(1), UtcNs(0), images)  # whichever: one pulse is tested by itself
-    adjusted = adjust(skis_of(system, [measured], np.zeros((1, len(system.names), 3))), system.covariance)
-    row = SIDES.index(side)
-    if not adjusted.ok[row] or adjusted.chi_square[row] < chdtri(adjusted.redundancy[row], RISK):
-        return None
-    worst = max(zip(system.names, adjusted.w[row], strict=True), key=lambda each: np.nan_to_num(each[1]))
-    return f"the lines of the images do not meet in space, that of {worst[0]} least"
+    if system is None:
+        found.stopped.update(dict.fromkeys(lines, "skis are followed in space: orient the cameras first"))
+        return
+    start = ski_start(desk, system, here, order.pulse, known)
+    asked = tuple(line in lines for line in BINDINGS)
+    for line, reason in start.refused.items():
+        if line in lines:
+            found.stopped[line] = reason
+    try:
+        run = _Run(desk, system, start, here, order)
+    except NoFitError as error:
+        found.stopped.update(dict.fromkeys(lines, str(error)))
+        return
+    run.follow(found, (asked[0], asked[1]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Anchor:
+    """Where an image showed a binding that was marked by hand, against where its ski alone has it.
+
+    Attributes:
+        along, across: px.
+        covariance: (2, 2) px^2 of that.
+        px_per_m: how large 1 m was there.
+    """
+
+    along: float
+    across: float
+    covariance: Floats
+    px_per_m: float
+
+    def at(self, seen: ImageLine, px_per_m: float) -> tuple[Floats, Floats]:
+        """The binding on the ski as it is seen now, (2,) px, and its covariance (2, 2) px^2."""
+        axes, scale = _axes(seen), px_per_m / self.px_per_m
+        place = seen.binding + scale * np.array((self.along, self.across)) @ axes
+        return place, seen.binding_covariance + self.covariance
+
+
+def _axes(seen: ImageLine) -> Floats:
+    """Unit vectors (2, 2) along a line in an image and across it, in rows."""
+    along = (seen.xy[1] - seen.xy[0]) / np.hypot(*(seen.xy[1] - seen.xy[0]))
+    return np.array((along, (-along[1], along[0])))
+
+
+def _anchors(system: CameraSystem, marks: Mapping[Key, Entered], first: FittedBars) -> dict[tuple[str, str], _Anchor]:
+    """By binding and camera, those whose ski the camera shows."""
+    anchors = {}
+    for key, entered in marks.items():
+        if key.thing not in BINDINGS.values() or entered.xy is None or entered.state is not MarkState.MEASURED:
+            continue
+        k = list(BINDINGS.values()).index(key.thing)
+        seen = first.lines[key.camera][k] if key.camera in first.lines else None
+        if seen is not None:
+            along, across = _axes(seen) @ (np.array(entered.xy) - seen.binding)
+            covariance = seen.binding_covariance + np.diag(np.square(sigma_of(entered)))
+            scale = _px_per_m(system[key.camera], first.poses.point[k])
+            anchors[key.thing, key.camera] = _Anchor(float(along), float(across), covariance, scale)
+    return anchors
+
+
+def _px_per_m(camera: PlacedCamera, place: Floats) -> float:
+    return float(camera.camera.interior[0] / np.linalg.norm(place - camera.position))
+
+
+class _Run:
+    """The following of a pair of skis."""
+
+    def __init__(
+        self, desk: Desk, system: CameraSystem, start: SkiStart, marks: Mapping[Key, Entered], order: TrackOrder
+    ) -> None:
+        self._desk, self._system, self._start, self._order = desk, system, start, order
+        self._motion = PairMotion(1 / desk.log.facts.rate_hz)
+        first = _fitted(desk, system, order.pulse, start, start.expected, start.present)
+        self._first = first
+        self._anchors = _anchors(system, marks, first)
+        self._open = first.seen
+        self._shape, self._shape_sigma = first.shape, np.maximum(first.shape_sigma, _SHAPE_M)
+        self._missed: list[list[str]] = [[] for _ in BINDINGS]
+        self._slipped = [False for _ in BINDINGS]
+        self._belief = self._motion.begun(first.poses, first.covariance, start.known)
+
+    def follow(self, found: Found, asked: tuple[bool, bool]) -> None:
+        """Through the pulses, as far as the images show the skis."""
+        order, pulse = self._order, self._order.pulse
+        for k, line in enumerate(BINDINGS):
+            if asked[k] and not self._open[k]:
+                found.stopped.setdefault(line, _unseen(self._first, k, pulse))
+        for _ in range(order.most):
+            pulse += order.direction
+            if not any(self._open):
+                break
+            self._belief = self._motion.predicted(self._belief, order.direction)
+            fitted, reason = self._at(pulse)
+            for k in np.flatnonzero(self._open).tolist():
+                if fitted is None or not fitted.seen[k]:
+                    self._miss(found, pulse, k, reason or _unseen(fitted, k, pulse))
+                else:
+                    self._keep(found, pulse, k, fitted, asked[k])
+        for k, line in enumerate(BINDINGS):
+            if asked[k]:
+                found.stopped.setdefault(line, self._missed[k][-1] if self._missed[k] else _FAR)
+
+    def _miss(self, found: Found, pulse: int, k: int, reason: str) -> None:
+        """A ski is not seen; after some such pulses it has ended."""
+        line = list(BINDINGS)[k]
+        self._missed[k].append(reason)
+        if self._slipped[k]:
+            _forget(found, pulse, BINDINGS[line])
+        if len(self._missed[k]) > _MISSED:
+            self._open = (self._open[0] and k != 0, self._open[1] and k != 1)
+
+    def _at(self, pulse: int) -> tuple[FittedBars | None, str]:
+        """The skis at a pulse; None with the reason if there is nothing, or if it contradicts the motion."""
+        belief = self._belief
+        if pulse not in self._desk.log.times:
+            return None, f"pulse {pulse}: the log ends"
+        expected = ExpectedBars(belief.poses, belief.pose_covariance, self._shape, self._shape_sigma)
+        try:
+            fitted = _fitted(self._desk, self._system, pulse, self._start, expected, self._first.seen, belief)
+        except NoFitError as error:
+            return None, str(error)
+        if not any(fitted.seen):
+            return fitted, ""
+        if fitted.distance > chdtri(5 * sum(fitted.seen), _RISK):
+            return None, f"pulse {pulse}: the skis contradict their motion (chi-squared {fitted.distance:.0f})"
+        self._belief = self._motion.updated(belief, fitted.poses, fitted.covariance)
+        return fitted, ""
+
+    def _keep(self, found: Found, pulse: int, k: int, fitted: FittedBars, asked: bool) -> None:
+        """Take a ski that is seen, and its binding.
+
+        Of two skis that cover each other, the end of one may be taken for that of the other: where only one of them is
+        seen well, its ends do not tell where the binding is.
+        """
+        self._missed[k].clear()
+        line = list(BINDINGS)[k]
+        if asked:
+            for camera, of in fitted.lines.items():
+                if (seen := of[k]) is not None:
+                    _put(found, pulse, camera, line, seen, MarkSource.TRACKED)
+        binding = BINDINGS[line]
+        if binding in found.stopped and self._start.bound[k]:
+            shown = self._keep_binding(found, pulse, k, binding, fitted) if fitted.seen == self._first.seen else set()
+            if self._slipped[k]:
+                _forget(found, pulse, binding, shown)
+
+    def _keep_binding(self, found: Found, pulse: int, k: int, name: str, fitted: FittedBars) -> set[str]:
+        """Put a binding where its ski has it; the cameras in which that was possible."""
+        shown = set()
+        for camera, of in fitted.lines.items():
+            seen, anchor, key = of[k], self._anchors.get((name, camera)), Key(pulse, camera, name)
+            known = found.marks.get(key)
+            if seen is None or anchor is None:
+                continue
+            place, spread = anchor.at(seen, _px_per_m(self._system[camera], fitted.poses.point[k]))
+            if known is not None and known.xy is not None and known.sigma is not None:
+                off = np.array(known.xy) - place
+                both = spread + np.diag(np.square(known.sigma))
+                if off @ np.linalg.solve(both, off) > chdtri(2, _RISK):
+                    self._slipped[k] = True  # its appearance was followed to another place
+            found.add(key, place, np.sqrt(np.diagonal(spread)))
+            shown.add(camera)
+        return shown
+
+
+def _fitted(
+    desk: Desk, system: CameraSystem, pulse: int, start: SkiStart, expected: ExpectedBars, present: tuple[bool, bool],
+    belief: PairBelief | None = None,
+) -> FittedBars:  # fmt: skip
+    rate = desk.log.facts.rate_hz
+    velocity = start.known[0].velocity if belief is None else belief.velocity.mean(axis=0) * rate
+    return fit_bars(ski_views(desk, system, pulse, velocity), expected, present)
+
+
+def _put(found: Found, pulse: int, camera: str, line: str, seen: ImageLine, source: MarkSource) -> None:
+    for vertex, place in enumerate(seen.xy):
+        found.add(Key(pulse, camera, line, vertex), place, np.array((seen.sigma, seen.sigma)), source)
+
+
+def _unseen(fitted: FittedBars | None, k: int, pulse: int) -> str:
+    shown = [] if fitted is None else [camera for camera, of in fitted.lines.items() if of[k] is not None]
+    return f"pulse {pulse}: two images must show the ski well; there is {' and '.join(shown) or 'none'}"
+
+
+def _forget(found: Found, pulse: int, name: str, but: Collection[str] = ()) -> None:
+    """Leave out a binding that was followed by its appearance after that had slipped, but in some cameras."""
+    for key in [key for key in found.marks if key.pulse == pulse and key.thing == name and key.camera not in but]:
+        del found.marks[key]

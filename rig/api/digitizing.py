@@ -318,7 +318,9 @@ class TrackOrder(Model):
     things: Annotated[list[Name], Field(min_length=1, max_length=100)]
     pulse: PulseNumber
     direction: Literal[1, -1]
-    most: Annotated[int, Field(ge=1, le=10_000), WHOLE] = 30
+    most: Annotated[
+        int, Field(ge=0, le=10_000, description="pulses; 0: find skis more exactly at this pulse"), WHOLE
+    ] = 30
 
 
 class Tracked(Model):

@@ -148,6 +148,20 @@ class Background:
         looked_at = (left, first, right, last)
         return [self._region(image, moment, front, box) for box in _boxes(front, looked_at)]
 
+    def part(self, image: Grey, box: tuple[int, int, int, int]) -> Region:
+        """A part of an image, whether anything is in front there or not.
+
+        Args:
+            image: (rows, columns) of this camera.
+            box: column and row of the first and behind the last pixel.
+        """
+        moment = self._moment(image)
+        front = np.zeros(image.shape, np.uint8)
+        where = slice(box[1], box[3]), slice(box[0], box[2])
+        behind, variance = self._expected(where, moment)
+        front[where] = (image[where].astype(np.float32) - behind) ** 2 > variance * np.float32(_FRONT**2)
+        return self._region(image, moment, front, box)
+
     def _region(
         self, image: Grey, moment: "_Moment", front: NDArray[np.uint8], box: tuple[int, int, int, int]
     ) -> Region:

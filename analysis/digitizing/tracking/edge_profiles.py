@@ -60,11 +60,6 @@ class Strip:
         along, across = t[..., None] * self.length * self.along, u[..., None] * self.across
         return np.asarray(self.start + along + across)
 
-    def thinned(self, most: int) -> "Strip":
-        """About so many of its sections, spread evenly."""
-        step = max(1, len(self.t) // most)
-        return replace(self, **{k: getattr(self, k)[::step] for k in ("t", "u", "grey", "there")})
-
     def within(self, low: Floats, high: Floats) -> "Strip":
         """Only the pixels between two lines, each (2,) u at start and end."""
         line_low, line_high = (line[0] + (line[1] - line[0]) * self.t for line in (low, high))
@@ -125,16 +120,6 @@ def strip(image: Grey, start: Floats, end: Floats, reach: float) -> Strip:
     parts = np.zeros((4, count, max(1, int(sizes.max(initial=0)))))
     parts[:, section[order], place] = t[order], u[order], grey[order], np.ones(len(order))
     return Strip(start, along, length, *parts)
-
-
-def unexplained(pixels: Strip, ends: Floats) -> float:
-    """Squared residuals of borders where they are, (b, 2) as for `fit_borders`: to choose where to start."""
-    line = ends[:, 0, None, None] + (ends[:, 1] - ends[:, 0])[:, None, None] * pixels.t
-    right_of = np.concatenate((np.ones_like(line[:1]), (pixels.u > line).astype(float)))
-    columns = (right_of * pixels.there).transpose(1, 2, 0)
-    normal = columns.transpose(0, 2, 1) @ columns + 1e-6 * np.eye(len(ends) + 1)
-    right = columns.transpose(0, 2, 1) @ pixels.grey[..., None]
-    return float((pixels.grey**2 * pixels.there).sum() - (right * np.linalg.solve(normal, right)).sum())
 
 
 def fit_borders(pixels: Strip, ends: Floats, noise: float) -> Borders | None:

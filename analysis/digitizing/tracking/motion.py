@@ -18,7 +18,8 @@ from rig.arrays import Floats, Integers
 
 #: Density of the jerk's noise, m^2/s^5: that of the liveliest part of a jumper, at the edge.
 DENSITY: Final = float(start_densities().max())
-_SPEED, _ACCELERATION, _PLACE = 30.0, 20.0, 100.0  # standard deviations before anything is known, m/s, m/s^2, m
+_SPEED, _PLACE = 30.0, 100.0  # standard deviations before anything is known, m/s, m
+ACCELERATION: Final = 20.0  #: standard deviation of an acceleration, m/s^2
 _ITERATIONS = 3  # of an update: the images are not linear in space
 _TINY = 1e-4  # px, of a mark against its own offset
 
@@ -80,7 +81,7 @@ class Motion:
         unit, h = self.views.unit, self._interval
         mean, spread = np.zeros(self._size), np.zeros(self._size)
         mean[: self._d] = place
-        spread[: self._moving] = np.repeat((_PLACE, _SPEED * h, _ACCELERATION * h**2 / 2), self._d) * unit
+        spread[: self._moving] = np.repeat((_PLACE, _SPEED * h, ACCELERATION * h**2 / 2), self._d) * unit
         if known is not None and self._d == 3:
             mean[3:6] = known.velocity * h
             spread[3:6] = known.sigma * h

@@ -12,6 +12,7 @@ from analysis.digitizing.files import DeskFiles
 from analysis.measurements.model import POINTS
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from rig.api.digitizing import PlaceAction
+from simrig.world.conditions.effects import MissingMarker
 from simrig.world.scenario import load_scenario
 
 #: Scatter of a click, px.
@@ -38,9 +39,15 @@ class Click:
         )  # fmt: skip
 
 
-def write_jump(folder: Path) -> HillLog:
-    """The log."""
+def write_jump(folder: Path, *, markers: bool = True, seed: int | None = None) -> HillLog:
+    """The log, of a jumper with markers or without; of the hill's own seed if none is given."""
     scenario = load_scenario(Path("config/scenarios/training.toml")).model_copy(update={"stamp": False})
+    if not markers:
+        bare = tuple(MissingMarker(marker=name) for name in POINTS)
+        jumper = scenario.jumper.model_copy(update={"missing_markers": bare})
+        scenario = scenario.model_copy(update={"jumper": jumper})
+    if seed is not None:
+        scenario = scenario.model_copy(update={"seed": seed})
     return write_hill_log(folder / "jump", scenario, HILL_PULSES)
 
 
@@ -53,15 +60,18 @@ def opened(log: HillLog, *, survey: bool = True) -> Desk:
     return desk
 
 
-def clicks(desk: Desk, log: HillLog, seed: int, pulses: range = MEASURED) -> Iterator[Click]:
-    """Clicks of an operator on the points that he sees, and on two places of each ski."""
+def clicks(desk: Desk, log: HillLog, seed: int, pulses: range = MEASURED, *, markers: bool = True) -> Iterator[Click]:
+    """Clicks of an operator on the points that he sees, and on two places of each ski.
+
+    Of a jumper without markers he sees helmet, hip and bindings themselves.
+    """
     random = np.random.default_rng(seed)
     for pulse in pulses:
         truth = log.truth[pulse]
         for camera in desk.oriented().cameras.values():
             for thing, xyz, seen in _things(truth, camera.name):
                 px = camera.project(np.array(xyz))
-                if seen and np.isfinite(px).all() and (px > 0).all() and (px < camera.size - 1).all():
+                if (seen or not markers) and np.isfinite(px).all() and (px > 0).all() and (px < camera.size - 1).all():
                     x, y = px + random.normal(0, SCATTER_PX, 2)
                     yield Click(pulse, camera.name, thing, (float(x), float(y)))
 

@@ -5,7 +5,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from analysis.digitizing.tracking.refining import refine_disc, refine_edge, refine_line
+from analysis.digitizing.tracking.refining import refine_disc, refine_edge
 from rig.arrays import Floats
 from rig.errors import NoFitError
 from tests.analysis.digitizing.tracking.drawing import bar, disc, drawn, edge, noisy, textured
@@ -14,7 +14,6 @@ SIZE = 64
 MIDDLE = np.array((32.0, 32.0))
 #: The root mean square of n normalized errors scatters by 1 / sqrt(2 n): 0.8 to 1.2 is 3 sigma or more from 140 on.
 ROUNDS = 70
-ALONG = np.array(((-20.0, 1.0), (20.0, -2.0)))
 
 
 def _across(angle: float) -> Floats:
@@ -69,51 +68,15 @@ def test_a_click_at_an_edge_of_a_thin_bar_finds_that_edge() -> None:
     assert 0.8 < _rms(errors) < 1.2
 
 
-def test_clicks_along_a_ski_find_its_axis_and_width() -> None:
-    rng = np.random.default_rng(6)
-    errors: list[float] = []
-    widths: list[float] = []
-    for _ in range(ROUNDS // 2):
-        place, angle, half = rng.uniform(44, 52, 2), rng.uniform(0, np.pi), rng.uniform(1.4, 5)
-        along = np.array((np.cos(angle), np.sin(angle)))
-        scene = bar(place, angle, half, (rng.choice((40, 150)), rng.choice((110, 200)), 90))
-        clicks = np.array((place - 30 * along, place + 32 * along)) + rng.uniform(-2, 2, (2, 1)) * _across(angle)
-        found = refine_line(drawn(scene, 96, rng), clicks)
-        errors += list((found.xy - place) @ _across(angle) / found.sigma)
-        widths += list(found.width - 2 * half)
-        assert found.edges == 2
-    assert 0.75 < _rms(errors) < 1.25  # 2 ends of 35 lines
-    assert np.abs(widths).max() < 0.3
-
-
-def test_one_edge_of_a_ski_is_enough_if_its_width_is_known() -> None:
-    rng = np.random.default_rng(7)
-    errors: list[float] = []
-    for _ in range(6):
-        place, angle, half = rng.uniform(46, 50, 2), rng.uniform(0, np.pi), 2.2
-        along = np.array((np.cos(angle), np.sin(angle)))
-        image = drawn(bar(place, angle, half, (60, 200, 200)), 96, rng)
-        clicks = np.array((place - 30 * along, place + 30 * along))
-        with pytest.raises(NoFitError, match="no line here"):
-            refine_line(image, clicks)
-        found = refine_line(image, clicks - 1.0 * _across(angle), np.full(2, 2 * half))
-        off = np.abs((found.xy - place) @ _across(angle))
-        other_side = np.abs((found.xy - place) @ _across(angle) + 2 * half)
-        errors += list(np.minimum(off, other_side) / found.sigma)
-        assert found.edges == 1
-    assert _rms(errors) < 1.4
-
-
 @pytest.mark.parametrize("make", [noisy, textured])
-def test_noise_and_texture_are_no_discs_and_no_lines(make: type) -> None:
+def test_noise_and_texture_are_no_discs(make: type) -> None:
     rng = np.random.default_rng(8)
     accepted = 0
     for _ in range(12):
         image = make(SIZE, rng)
-        for refine in (lambda of: refine_disc(of, MIDDLE), lambda of: refine_line(of, MIDDLE + ALONG)):
-            with suppress(NoFitError):
-                refine(image)
-                accepted += 1
+        with suppress(NoFitError):
+            refine_disc(image, MIDDLE)
+            accepted += 1
     assert accepted <= 1  # a texture holds a disc now and then
 
 
@@ -144,11 +107,3 @@ def test_a_place_outside_the_image_is_refused(place: tuple[float, float]) -> Non
     for refine in (refine_disc, refine_edge):
         with pytest.raises(NoFitError, match="outside the image"):
             refine(image, np.array(place))
-
-
-def test_a_line_needs_two_places_that_lie_apart() -> None:
-    image = noisy(SIZE, np.random.default_rng(13))
-    with pytest.raises(NoFitError, match="two places"):
-        refine_line(image, MIDDLE[None])
-    with pytest.raises(NoFitError, match="nearer than"):
-        refine_line(image, np.array((MIDDLE, MIDDLE + 2)))

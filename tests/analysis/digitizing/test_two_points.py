@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.digitizing.tracking.skis import as_two_points
+from analysis.digitizing.two_points import as_two_points
 
 
 def test_two_points_say_as_much_as_all() -> None:

@@ -1,0 +1,205 @@
+"""Least squares of the unknowns of a pair of skis, robust against what is no ski, with honest covariances.
+
+The variance of a pixel is that of its noise and that of the model, whose error is in proportion to the contrast C,
+
+    variance = noise^2 + (m C)^2,
+
+with m from the residuals. Errors of the model are alike in neighbouring pixels: their correlation is
+exp(-|dt| / 10 px - |du| / 1.5 px) along and across a ski. The fit weighs pixels as if that many were one, and its
+covariance is a sandwich of the normal equations and the true covariance of the pixels. Pixels that show something else
+(a leg, a flag, the other boot) lose their weight (Geman and McClure).
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from analysis.ski_bars.bars import SKIS, ExpectedBars
+from analysis.ski_bars.model import POSE, SHAPE, SHOVEL_M, BarModel, Predicted, hidden_by_boots
+from analysis.ski_bars.pixels import Pixels
+from rig.arrays import Flags, Floats
+
+_ALONG_PX, _ACROSS_PX = 10.0, 1.5  # over which errors of the model are alike
+_TOGETHER: Final = 2 * _ALONG_PX * 2 * _ACROSS_PX  # pixels with one error
+_MODEL, _LEAST_MODEL = 0.1, 0.02  # m before the residuals tell it, and at least
+_SHOVEL: Final = 0.3  #: m of the shovel, whose form is not that of the model
+_SIGMAS = 3.0  # residuals that count a quarter
+_MAD_TO_SIGMA = 1.4826
+_BESIDE_PX = 2.0  # beside a ski, whose pixels still tell m
+_ITERATIONS, _ROUNDS = 12, 2
+_ENOUGH = 0.05  # of a standard deviation: a smaller step changes nothing
+_BLUR_PX, _BLUR_LOG = 0.65, 0.25
+_HALF_M, _HALF_LOG = 0.035, 0.4  # half the width that a ski shows, and its spread
+_GREY_SIGMA = 100.0
+_COVERED = 0.05  # of a pixel by a ski
+_MOST_DAMPED = 1e3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """A fitted pair of skis.
+
+    Attributes:
+        x: unknowns, as `model.Unknowns` orders them.
+        cost: half the robust sum of squares, with that of the expectation.
+        model_error: m.
+    """
+
+    x: Floats
+    cost: float
+    model_error: float
+
+
+class BarFit:
+    """The pixels of a pulse, the model, and what was expected.
+
+    Args:
+        model: of the images.
+        pixels: around the skis.
+        expected: before.
+
+    Attributes:
+        used: (m, 2) which skis count in which images.
+    """
+
+    def __init__(self, model: BarModel, pixels: Pixels, expected: ExpectedBars) -> None:
+        self.model, self.pixels = model, pixels
+        self.used = np.tile(np.array(model.present), (len(model.views), 1))
+        at = model.unknowns
+        self.mean, sigma = np.zeros(at.size), np.empty(at.size)
+        self.mean[SHAPE], sigma[SHAPE] = expected.shape.ravel(), expected.shape_sigma.ravel()
+        self.mean[at.blur], sigma[at.blur] = np.log(_BLUR_PX), _BLUR_LOG
+        self.mean[at.width], sigma[at.width] = np.log(_HALF_M), _HALF_LOG
+        sigma[at.brightness] = _GREY_SIGMA
+        self.prior = np.zeros((at.size, at.size))
+        self.prior[POSE, POSE] = np.linalg.inv(expected.covariance)
+        rest = slice(POSE.stop, None)
+        self.prior[rest, rest] = np.diag(sigma[rest] ** -2.0)
+
+    def start(self, shift: Floats) -> Floats:
+        """Unknowns to start from, with the poses shifted by steps (10,); the brightness is that along the axes."""
+        at, x = self.model.unknowns, self.mean.copy()
+        x[POSE] = shift
+        seen = self.model.predicted(self.pixels, x, derivatives=False)
+        for c in range(len(self.model.views)):
+            here = self.pixels.camera == c
+            for k in range(SKIS):
+                core = here & (np.abs(seen.u[:, k]) < 1.0) & (seen.cover[:, k] > 0.5)
+                if core.any():
+                    x[at.brightness[c, k]] = np.median(self.pixels.grey[core])
+        return x
+
+    def cost(self, x: Floats, model_error: float = _MODEL) -> float:
+        """Half the robust sum of squares at unknowns."""
+        return self._cost(x, self.model.predicted(self.pixels, x, derivatives=False), model_error)
+
+    def solved(self, x: Floats) -> Estimate:
+        """The minimum near a start: Gauss-Newton with damping."""
+        m = _MODEL
+        for _ in range(_ROUNDS):
+            x, cost = self._minimum(x, m)
+            m, before = self._model_error(x), m
+            if abs(np.log(m / before)) < 0.1:
+                break
+        return Estimate(x, cost, m)
+
+    def _minimum(self, x: Floats, m: float) -> tuple[Floats, float]:
+        damping = 1e-3
+        seen = self.model.predicted(self.pixels, x)
+        fitted = self.fitted(x, seen)
+        cost = self._cost(x, seen, m, fitted)
+        for _ in range(_ITERATIONS):
+            weight = self.weights(x, seen, fitted, m)
+            normal = seen.by_unknowns.T @ (weight[:, None] * seen.by_unknowns) + self.prior
+            off = self.pixels.grey - seen.grey
+            right = seen.by_unknowns.T @ (weight * off) - self.prior @ self._from_mean(x)
+            while True:
+                step = np.linalg.solve(normal + damping * np.diag(np.diagonal(normal)), right)
+                tried = self.model.predicted(self.pixels, x + step)
+                less = self._cost(x + step, tried, m, fitted)
+                if less <= cost or damping > _MOST_DAMPED:
+                    break
+                damping *= 10
+            if less > cost:
+                break
+            x, seen, damping, cost = x + step, tried, damping / 10, less
+            if step @ normal @ step < _ENOUGH**2:
+                break
+        return x, cost
+
+    def _from_mean(self, x: Floats) -> Floats:
+        return np.asarray(x - self.mean)
+
+    def _cost(self, x: Floats, seen: Predicted, m: float, fitted: Flags | None = None) -> float:
+        off = self._from_mean(x)
+        model = self._model_variance(x, seen, m)
+        square = (self.pixels.grey - seen.grey) ** 2 / (self.pixels.noise + model)
+        share = (self.pixels.noise + model) / (self.pixels.noise + _TOGETHER * model)
+        loss = share * square * _SIGMAS**2 / (square + _SIGMAS**2)
+        return float(loss[self.fitted(x, seen) if fitted is None else fitted].sum() + off @ self.prior @ off) / 2
+
+    def _contrast(self, x: Floats) -> Floats:
+        """(n,) of the ski that differs more from the static scene there."""
+        bright = x[self.model.unknowns.brightness][self.pixels.camera]
+        off = np.where(np.array(self.model.present), np.abs(bright - self.pixels.behind[:, None]), 0.0)
+        return np.maximum(off[:, 0], off[:, 1])
+
+    def _model_variance(self, x: Floats, seen: Predicted, m: float) -> Floats:
+        shovel = (seen.s[:, 0] > SHOVEL_M) & np.isfinite(seen.s[:, 0])
+        shovel |= (seen.s[:, 1] > SHOVEL_M) & np.isfinite(seen.s[:, 1])
+        return np.asarray((np.where(shovel, np.hypot(m, _SHOVEL), m) * self._contrast(x)) ** 2)
+
+    def robust(self, x: Floats, seen: Predicted, m: float) -> Floats:
+        """(n,) weights of the pixels: 1 where the model holds, else towards 0."""
+        square = (self.pixels.grey - seen.grey) ** 2 / (self.pixels.noise + self._model_variance(x, seen, m))
+        return np.asarray((_SIGMAS**2 / (square + _SIGMAS**2)) ** 2)
+
+    def weights(self, x: Floats, seen: Predicted, fitted: Flags, m: float) -> Floats:
+        """(n,) weights in the normal equations: errors that neighbours share count once."""
+        together = self.pixels.noise + _TOGETHER * self._model_variance(x, seen, m)
+        return np.where(fitted, self.robust(x, seen, m) / together, 0.0)
+
+    def fitted(self, x: Floats, seen: Predicted) -> Flags:
+        """(n,) which pixels count: those of used images that no boot may hide."""
+        nearest = np.abs(seen.u).argmin(axis=1)
+        return np.asarray(self.used[self.pixels.camera, nearest] & ~hidden_by_boots(self.model, x, self.pixels))
+
+    def _model_error(self, x: Floats) -> float:
+        seen = self.model.predicted(self.pixels, x, derivatives=False)
+        near = ((np.abs(seen.u) < seen.half + _BESIDE_PX) & (seen.s < SHOVEL_M)).any(axis=1) & self.fitted(x, seen)
+        near &= (seen.cover > _COVERED).any(axis=1)
+        if not near.any():
+            return _MODEL
+        off = np.abs(self.pixels.grey - seen.grey)[near]
+        excess = (_MAD_TO_SIGMA * off) ** 2 - self.pixels.noise[near]
+        ratio = np.median(excess / np.maximum(self._contrast(x)[near], 1.0) ** 2)
+        return float(np.sqrt(np.clip(ratio, _LEAST_MODEL**2, (2 * _MODEL) ** 2)))
+
+    def covariance(self, found: Estimate) -> Floats:
+        """Covariance of the unknowns: the sandwich of normal equations and covariance of the pixels."""
+        x, m = found.x, found.model_error
+        seen = self.model.predicted(self.pixels, x)
+        fitted = self.fitted(x, seen)
+        normal, middle = self.sandwich(x, seen, seen.by_unknowns, fitted, m)
+        inverse = np.linalg.inv(normal + self.prior)
+        return np.asarray(inverse @ (middle + self.prior) @ inverse)
+
+    def sandwich(self, x: Floats, seen: Predicted, rows: Floats, fitted: Flags, m: float) -> tuple[Floats, Floats]:
+        """Normal equations of the pixels and the covariance of their right side, for derivatives `rows` (n, k)."""
+        weight = self.weights(x, seen, fitted, m)
+        weighted = weight[:, None] * rows
+        middle = weighted.T @ (self.pixels.noise[:, None] * weighted)
+        error = np.sqrt(self._model_variance(x, seen, m))[:, None] * weighted
+        nearest = np.abs(seen.u).argmin(axis=1)
+        for c in range(len(self.model.views)):
+            for k in np.flatnonzero(self.model.present).tolist():
+                here = np.flatnonzero((self.pixels.camera == c) & (nearest == k) & (np.abs(error).max(axis=1) > 0))
+                alike = np.exp(-_apart(seen.t[here, k]) / _ALONG_PX - _apart(seen.u[here, k]) / _ACROSS_PX)
+                middle += error[here].T @ (alike @ error[here])
+        return np.asarray(rows.T @ weighted), middle
+
+
+def _apart(place: Floats) -> Floats:
+    values = place.astype(np.float32)
+    return np.asarray(np.abs(values[:, None] - values), np.float64)

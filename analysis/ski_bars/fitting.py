@@ -1,0 +1,144 @@
+"""Fits both skis of a pulse in all images that show them, from what is expected, and refuses what does not hold."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import chdtri
+
+from analysis.ski_bars.bars import OF_POSE, OF_SHAPE, SKIS, ExpectedBars, Poses
+from analysis.ski_bars.estimate import BarFit, Estimate
+from analysis.ski_bars.image_lines import REDUNDANCY, ImageLine, image_lines
+from analysis.ski_bars.model import POSE, SHAPE, BarModel
+from analysis.ski_bars.pixels import SkiView, pixels_around
+from rig.arrays import Flags, Floats
+
+_EXPLAINED: Final = 0.7  #: of the differences from the static scene along a ski, at least
+_VISIBLE: Final = 0.6  #: of the pixels of a ski, at least
+_WORST_PX: Final = 1.0  #: sigma of a line across it, at most
+_CONTRADICTION: Final = float(chdtri(REDUNDANCY, 1e-4))  #: one sound image in ten thousand contradicts the others more
+_FEWEST: Final = 2  #: images that show a ski
+_STARTS: Final = 12  # of each ski, beside the expected place
+_REACH_SIGMAS, _WIDEST_M = 2.0, 0.15  # beside and beyond the expected skis, that are looked at
+_ENDS_M: Final = np.arange(-0.3, 0.35, 0.05)  # from where tail and tip usually are, m
+_UNSURE_END_M: Final = 0.1  # from this sigma on, ends are sought
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedBars:
+    """A pair of skis.
+
+    Attributes:
+        poses: as fitted with all images; those of a ski that is not seen as they were expected.
+        covariance: (10, 10) of the poses, see `ExpectedBars`; without that of the cameras.
+        shape: (2, 3) bend, tail and tip, m.
+        shape_sigma: (2, 3) m.
+        lines: by camera, of both skis; None where it does not show one well.
+        seen: (2,) which skis two images or more show.
+        distance: chi-squared of the fitted poses against the expected ones.
+    """
+
+    poses: Poses
+    covariance: Floats
+    shape: Floats
+    shape_sigma: Floats
+    lines: Mapping[str, Sequence[ImageLine | None]]
+    seen: tuple[bool, bool]
+    distance: float
+
+
+def fit_bars(views: Sequence[SkiView], expected: ExpectedBars, present: tuple[bool, bool] = (True, True)) -> FittedBars:
+    """Fit a pair of skis.
+
+    Args:
+        views: images of one pulse.
+        expected: where the skis should be, and how they are shaped.
+        present: which of both there are; the other one is left as it is expected.
+    """
+    wide = min(_WIDEST_M, _REACH_SIGMAS * float(np.sqrt(np.diagonal(expected.covariance)[[2, 7]].max())))
+    ends = expected.shape[:, 1:] + _REACH_SIGMAS * expected.shape_sigma[:, 1:] * (-1, 1)
+    pixels = pixels_around(views, expected.poses, ends, wide)
+    fit = BarFit(BarModel(views, expected.poses, present), pixels, expected)
+    found = fit.solved(fit.start(np.zeros(POSE.stop)))
+    if expected.shape_sigma[:, 1:].max() > _UNSURE_END_M:
+        found = fit.solved(_with_ends(fit, found.x))
+    lines = image_lines(fit, found)
+    good = _good(lines)
+    if (good.sum(axis=0) < np.where(present, _FEWEST, 0)).any():
+        tried = fit.solved(_other_start(fit, expected))
+        if tried.cost < found.cost:
+            found, lines = tried, image_lines(fit, tried)
+            good = _good(lines)
+    return _judged(fit, found, good, lines)
+
+
+def _judged(fit: BarFit, found: Estimate, good: Flags, lines: list[list[ImageLine | None]]) -> FittedBars:
+    """Without what was refused, fitted once more."""
+    if (good != fit.used).any():
+        fit.used = good & (good.sum(axis=0) >= _FEWEST)
+        if fit.used.any():
+            found = fit.solved(found.x)
+            lines = image_lines(fit, found)
+            good = _good(lines)
+            fit.used = good & (good.sum(axis=0) >= _FEWEST)
+    kept = {
+        view.camera.name: [line if fit.used[c, k] else None for k, line in enumerate(lines[c])]
+        for c, view in enumerate(fit.model.views)
+    }
+    covariance = fit.covariance(found)
+    step = found.x[POSE] - fit.mean[POSE]
+    seen = fit.used.sum(axis=0) >= _FEWEST
+    return FittedBars(
+        fit.model.poses(found.x),
+        covariance[POSE, POSE],
+        found.x[SHAPE].reshape(SKIS, OF_SHAPE),
+        np.sqrt(np.diagonal(covariance)[SHAPE]).reshape(SKIS, OF_SHAPE),
+        kept,
+        (bool(seen[0]), bool(seen[1])),
+        float(step @ fit.prior[POSE, POSE] @ step),
+    )
+
+
+def _good(lines: list[list[ImageLine | None]]) -> Flags:
+    """(m, 2) which lines hold."""
+    return np.array(
+        [
+            [
+                line is not None
+                and line.explained > _EXPLAINED
+                and line.visible > _VISIBLE
+                and line.sigma < _WORST_PX
+                and line.contradiction < _CONTRADICTION
+                for line in of
+            ]
+            for of in lines
+        ]
+    )
+
+
+def _other_start(fit: BarFit, expected: ExpectedBars) -> Floats:
+    """The best of some places that may be expected as well, ski by ski."""
+    root = np.linalg.cholesky(expected.covariance)
+    draws = np.random.default_rng(1).normal(size=(_STARTS, SKIS * OF_POSE)) @ root.T
+    best = np.zeros(SKIS * OF_POSE)
+    cost = fit.cost(fit.start(best))
+    for k in np.flatnonzero(fit.model.present).tolist():
+        own = slice(OF_POSE * k, OF_POSE * (k + 1))
+        for draw in draws:
+            tried = best.copy()
+            tried[own] = draw[own]
+            less = fit.cost(fit.start(tried))
+            if less < cost:
+                best, cost = tried, less
+    return fit.start(best)
+
+
+def _with_ends(fit: BarFit, x: Floats) -> Floats:
+    """Unknowns with tails and tips where the images show them."""
+    for k in np.flatnonzero(fit.model.present).tolist():
+        for end in (1, 2):
+            at = SHAPE.start + OF_SHAPE * k + end
+            tries = [np.concatenate((x[:at], [fit.mean[at] + off], x[at + 1 :])) for off in _ENDS_M]
+            x = min(tries, key=fit.cost)
+    return x

@@ -23,6 +23,7 @@ from typing import Annotated, Any, Final
 
 import typer
 from typer._completion_classes import completion_init
+from typer.core import TyperGroup
 
 from rig.errors import BadInputError, SvevError
 from rig.host.file_names import NAME_MAX
@@ -65,11 +66,31 @@ _COMMANDS: Final = {
 }
 
 
+#: Options that were renamed; scripts may still use their former names, which no help shows.
+_FORMER_NAMES: Final = {"--output": "--out", "--marks": "--out"}
 #: Open files that are asked for, and the fewest that will do, beside those that are open already.
 _FILES: Final = 4096
 _LEAST_FILES: Final = 48
 #: The base of errors in the use of options and arguments, which Typer does not name.
 _USAGE_ERROR: Final[type[Exception]] = typer.BadParameter.__mro__[1]
+
+
+class _Commands(TyperGroup):
+    """All commands; help names an argument by its metavar alone, without the Python type behind it."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        left: list[Any] = [self]
+        while left:
+            command = left.pop()
+            left += getattr(command, "commands", {}).values()
+            for parameter in command.params:
+                if parameter.param_type_name == "argument":
+                    parameter.display_type_rich = _no_type
+
+
+def _no_type(ctx: Any) -> None:
+    """The type of an argument as help shows it: not at all."""
 
 
 def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:
@@ -96,12 +117,14 @@ def _overview() -> typer.Typer:
 def _without_commands() -> typer.Typer:
     app = typer.Typer(
         name="svev",
+        cls=_Commands,
         help="Live capture and photogrammetry for three synchronized cameras at a ski jump.",
         epilog="Add --debug anywhere to see the traceback of an error. Start with: svev demo",
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_every_command)
     return app
@@ -130,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     argv = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in argv
-    argv = [argument for argument in argv if argument != "--debug"]
+    argv = [_present_name(argument) for argument in argv if argument != "--debug"]
     as_json = argv[:1] == ["ctl"] and "--json" in argv
     try:
         _open_standard_streams()
@@ -160,6 +183,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             console.print_json_line({"error": told, "exit_code": code})
         return code
     return code if isinstance(code, int) else 0  # a number: --help, or a command that ends with a code of its own
+
+
+def _present_name(word: str) -> str:
+    """The present name of an option that was called otherwise in an earlier version; other words as they are."""
+    name, equals, value = word.partition("=")
+    return f"{_FORMER_NAMES.get(name, name)}{equals}{value}"
 
 
 def _completed(environment: Mapping[str, str]) -> typer.Typer:

@@ -1,5 +1,6 @@
 """Reads the survey of the balls: a `svev-network/1` file, JSON or TOML, without observations."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
@@ -127,12 +128,15 @@ def read_survey(path: Path) -> Survey:
         BadInputError: no network file but a table, observations in it, metric image frame, several images of a camera,
             or fewer than four surveyed balls, or a unit that is not the metre.
     """
-    if path.suffix.lower() in _TABLES:
+    try:
+        data = read_object(path, "survey")
+    except BadInputError as error:
+        if path.suffix.lower() not in _TABLES or not isinstance(error.__context__, json.JSONDecodeError):
+            raise
         raise BadInputError(
             f"{path}: is a table of points, and a survey holds the cameras too; make one of both: svev network import "
             f"K1.yml K2.yml K3.yml {path} -o survey.json"
-        )
-    data = read_object(path, "survey")
+        ) from None
     if data.get("observations"):
         raise BadInputError(
             f'{path}: has "observations", so it is a measured network and no survey; remove them, or use svev orient'

@@ -6,6 +6,7 @@ The tie points are the static ones (alternative 1) or these and the places of mo
 
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from photogrammetry.procedures.left_out import START_CAUTION, unplaced_points, w
 from photogrammetry.procedures.stages import constrained_stage, search_block
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
+
+_MOVING: Final = "H*"  # helmet
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,20 +43,19 @@ class Orientation:
 
 
 def orient(
-    network: Network, alternative: int = 2, moving: str = "H*", *, uncertain_interior: bool = False
+    network: Network, alternative: int = 2, moving: str | None = None, *, uncertain_interior: bool = False
 ) -> Orientation:
     """Estimate the poses of all images; interior orientations are constant, unless they are uncertain.
 
     Args:
         network: images, reference points and tie points.
         alternative: 1: static tie points alone; 2: moving ones too.
-        moving: pattern of the moving points' names (`*` and `?`).
+        moving: pattern of the moving points' names (`*` and `?`); None: `H*`, if there are such ones.
         uncertain_interior: interior parameters that a camera estimates and whose given value has a sigma are weighted
             observations, so that their uncertainty is in that of the poses. All others are held in any case.
 
     Raises:
-        BadInputError: the network has no images, a constant pose, or no moving point where alternative 1 leaves
-            them out.
+        BadInputError: the network has no images, a constant pose, or no point of the moving ones that are named.
         NotSolvableError, NotConvergedError: of the constrained adjustment; NotSolvableError also of an image that three
             points alone fix in several ways.
         RefusedError: images and survey contradict each other so much that no result can be believed.
@@ -122,14 +124,16 @@ def _with_interior(network: Network, uncertain: bool) -> tuple[Network, list[str
     return replace(network, cameras=tuple(cameras)), [words] if held else []
 
 
-def _prepared(network: Network, alternative: int, moving: str) -> tuple[Network, list[str]]:
+def _prepared(network: Network, alternative: int, moving: str | None) -> tuple[Network, list[str]]:
     """The network with the tie points of the alternative."""
     notes = []
     require_unknown_poses(network, "orientation")
     network = replace(network, datum=Datum())
-    moves = np.array([p.role is Role.TIE and fnmatchcase(p.name, moving) for p in network.points], dtype=bool)
+    moves = np.array(
+        [p.role is Role.TIE and fnmatchcase(p.name, moving or _MOVING) for p in network.points], dtype=bool
+    )
     if alternative == 1:
-        if not moves.any():
+        if moving is not None and not moves.any():
             raise BadInputError(
                 f'no tie point is called "{moving}", so alternative 1 has none to leave out; name the moving points '
                 "with --moving, or use alternative 2"

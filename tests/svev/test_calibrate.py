@@ -15,7 +15,7 @@ from tests.photogrammetry.synthetic import hill, lab_frame
 
 def _run(folder: Path, network: Network, *options: str) -> int:
     write_network(network, folder / "frame.json")
-    return main(["calibrate", str(folder / "frame.json"), "-o", str(folder / "cameras.json"), *options])
+    return main(["calibrate", str(folder / "frame.json"), "--force", "-o", str(folder / "cameras.json"), *options])
 
 
 def test_cameras_of_a_calibration_orient_the_hill(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -30,7 +30,7 @@ def test_cameras_of_a_calibration_orient_the_hill(tmp_path: Path, capsys: pytest
         assert "Correlations" in text
     assert "camera K1: c 14" in capsys.readouterr().out
     write_network(field.network, tmp_path / "hill.json")
-    options = ["--calibration", str(tmp_path / "cameras.json"), "-o", str(tmp_path / "poses.json")]
+    options = ["--calibration", str(tmp_path / "cameras.json"), "--force", "-o", str(tmp_path / "poses.json")]
     assert main(["orient", str(tmp_path / "hill.json"), *options]) == 0
     poses = json.loads((tmp_path / "poses.json").read_text())
     for camera in ("K1", "K2", "K3"):

@@ -1,8 +1,11 @@
 import json
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer.main
@@ -30,6 +33,58 @@ def test_every_command_explains_itself_with_an_example(command: str, capsys: pyt
     text = " ".join(capsys.readouterr().out.split())
     assert "Example" in text
     assert f"svev {command}" in text.split("Example")[1]
+
+
+def _walk(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
+    """Every command of the command line with the words that call it, groups too."""
+    yield " ".join(path), command
+    for name, below in getattr(command, "commands", {}).items():
+        yield from _walk(below, (*path, name))
+
+
+def test_every_option_of_every_command_is_spelt_and_explained_alike() -> None:
+    wrong = []
+    for path, command in _walk(typer.main.get_command(cli.command_line())):
+        for parameter in command.params:
+            name, opts = f"svev {path} {parameter.opts[-1]}", set(parameter.opts)
+            if not parameter.help:
+                wrong.append(f"{name}: no text")
+            flag = parameter.param_type_name == "option" and parameter.is_flag
+            if not flag and (not parameter.metavar or set(parameter.metavar) & set("<>[]{}")):
+                wrong.append(f"{name}: value {parameter.metavar!r}")
+            if opts & {"-o", "--out", "--output"} and opts != {"-o", "--out"}:
+                wrong.append(f"{name}: an output is -o and --out")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("words", [(), ("demo",), ("ctl",), ("ctl", "startlist", "load"), ("network", "import")])
+def test_help_has_a_short_name_everywhere(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([*words, "-h"]) == 0
+    short = capsys.readouterr().out
+    assert cli.main([*words, "--help"]) == 0
+    assert capsys.readouterr().out == short
+    assert not re.search("<[a-z]|[.]{3}}?[.]{3}", short)
+    assert "-h, --help" in short
+
+
+def test_nothing_is_overwritten_unless_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "rig.schema.json"
+    assert cli.main(["schema", "-o", str(path)]) == 0
+    path.write_text("mine")
+    assert cli.main(["schema", "--output", str(path)]) == 2  # the former name of the option
+    assert capsys.readouterr().err == f"svev: {path}: exists already; choose another name, or replace it by --force\n"
+    assert path.read_text() == "mine"
+    assert cli.main(["schema", f"--output={path}", "--force"]) == 0
+    assert path.read_text(encoding="utf-8") == rig_schema()
+
+
+def test_orient_and_analyze_agree_on_the_points_that_tie_the_images() -> None:
+    commands = dict(_walk(typer.main.get_command(cli.command_line(["orient", "analyze"]))))
+    defaults = {
+        parameter.default for name in ("orient", "analyze") for parameter in commands[name].params
+        if "--alternative" in parameter.opts
+    }  # fmt: skip
+    assert len(defaults) == 1
 
 
 def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,7 +23,7 @@ def test_nothing_to_orient_is_refused(tmp_path: Path, capsys: pytest.CaptureFixt
     balls = {name: point for name, point in network["points"].items() if "sigma" in point}
     path = tmp_path / "balls.json"
     path.write_text(json.dumps(network | {"images": {}, "observations": [], "points": balls}))
-    assert main(["orient", str(path), "-o", str(tmp_path / "poses.json")]) == 2
+    assert main(["orient", str(path), "--force", "-o", str(tmp_path / "poses.json")]) == 2
     assert "has no images" in capsys.readouterr().err
     assert not (tmp_path / "poses.json").exists()
 
@@ -33,7 +33,7 @@ def run(tmp_path: Path) -> Run:
     def orient(network: Network, *options: str) -> tuple[int, dict[str, Any]]:
         write_network(network, tmp_path / "hill.json")
         result = tmp_path / "poses.json"
-        code = main(["orient", str(tmp_path / "hill.json"), "-o", str(result), *options])
+        code = main(["orient", str(tmp_path / "hill.json"), "--force", "-o", str(result), *options])
         return code, json.loads(result.read_text()) if result.exists() else {}
 
     return orient
@@ -125,7 +125,7 @@ def test_alternatives(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     assert "T1" not in result["points"]
     printed = capsys.readouterr().out
     assert json.loads(printed[printed.rindex("\n{\n") :])["stages"] == result["stages"]
-    assert main(["orient", "none.json", "-o", "out.json", "--alternative", "3"]) == 2
+    assert main(["orient", "none.json", "--force", "-o", "out.json", "--alternative", "3"]) == 2
 
 
 def test_paper_weights(run: Run) -> None:
@@ -163,7 +163,7 @@ def test_bad_calibration_is_one_line(
 def test_other_bad_input_is_one_line(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, _ = run(hill(1).network, "--calibration", str(tmp_path / "none.json"))
     assert code == 2
-    code, _ = run(hill(1).network, "--alternative", "1")
+    code, _ = run(hill(1).network, "--moving", "Q*")
     assert code == 2
     code, _ = run(hill(1).network, "--report", str(tmp_path / "hill.json"))
     assert code == 2
@@ -191,7 +191,7 @@ def test_absurd_numbers_end_in_one_of_four_ways(seed: int, tmp_path: Path) -> No
         point[rng.choice(["X", "sigma"])][rng.integers(3)] = rng.choice([1e-30, 1e12, 1e6, 1e-10, 7.0])
         data["observations"][rng.integers(40)][rng.integers(2, 5)] = rng.choice([1e-30, 1e12, 1e6, 7.0])
     (tmp_path / "hill.json").write_text(json.dumps(data))
-    assert main(["orient", str(tmp_path / "hill.json"), "-o", str(tmp_path / "poses.json")]) in {0, 2, 3, 4}
+    assert main(["orient", str(tmp_path / "hill.json"), "--force", "-o", str(tmp_path / "poses.json")]) in {0, 2, 3, 4}
 
 
 def test_chance_does_not_converge(run: Run) -> None:

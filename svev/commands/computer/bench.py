@@ -13,20 +13,26 @@ _NAMES = (*SUITES, *DRAWN, *FIRED)
 
 
 def bench(
-    suites: Annotated[list[str] | None, typer.Argument(help=f"which of {', '.join(_NAMES)}; all if left out")] = None,
-    seconds: Annotated[float, typer.Option(min=1, max=600, help="length of each run, seconds")] = 20.0,
+    suites: Annotated[
+        list[str] | None, typer.Argument(metavar="SUITE", help=f"which of {', '.join(_NAMES)}; all if left out")
+    ] = None,
+    seconds: Annotated[float, typer.Option(metavar="S", min=1, max=600, help="length of each run, seconds")] = 20.0,
     draws: Annotated[
         int,
         typer.Option(
+            metavar="N",
             min=1,
             max=10_000,
             help="number of jumps that smoothing and jump-repeats draw, of networks of each kind for gross-errors",
         ),
     ] = 18,
-    pulses: Annotated[int, typer.Option(min=100, max=10_000_000, help="pulses of each case of pairing")] = 5000,
-    out: Annotated[Path, typer.Option(help="folder for the results, and for logs that are removed again")] = Path(
-        "bench/results"
-    ),
+    pulses: Annotated[
+        int, typer.Option(metavar="N", min=100, max=10_000_000, help="pulses of each case of pairing")
+    ] = 5000,
+    out: Annotated[
+        Path,
+        typer.Option("-o", "--out", metavar="DIR", help="folder for the results, and for logs that are removed again"),
+    ] = Path("bench/results"),
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Measure how fast this computer records and computes; each figure stands beside a baseline of the same run.

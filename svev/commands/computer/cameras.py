@@ -22,7 +22,9 @@ _ANSWER_S: Final = 0.5
 #: A camera that was given an address takes a moment until it answers there.
 _LOOKS: Final = 3
 
-Port = Annotated[str | None, typer.Option(help="look behind this network port only, e.g. enp2s0", show_default=False)]
+Port = Annotated[
+    str | None, typer.Option(metavar="PORT", help="look behind this network port only, e.g. enp2s0", show_default=False)
+]
 Json = Annotated[bool, typer.Option("--json", help="end with one JSON object")]
 
 
@@ -48,7 +50,7 @@ def list_command(interface: Port = None, as_json: Json = False) -> None:
 
 @app.command()
 def show(
-    address: Annotated[str, typer.Argument(help="IP address of the camera")],
+    address: Annotated[str, typer.Argument(metavar="ADDRESS", help="IP address of the camera")],
     as_json: Json = False,
 ) -> None:
     """Show the features of a camera: value, unit, what is allowed. Changes nothing.
@@ -71,8 +73,10 @@ def show(
 
 @app.command("set-ip")
 def set_ip(
-    camera: Annotated[str, typer.Argument(help="serial number, MAC address or present IP address of the camera")],
-    address: Annotated[str, typer.Argument(help="its new IP address")],
+    camera: Annotated[
+        str, typer.Argument(metavar="CAMERA", help="serial number, MAC address or present IP address of the camera")
+    ],
+    address: Annotated[str, typer.Argument(metavar="ADDRESS", help="its new IP address")],
     interface: Port = None,
     temporary: Annotated[bool, typer.Option("--temporary", help="only until the camera's power goes")] = False,
     as_json: Json = False,

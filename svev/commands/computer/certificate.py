@@ -13,9 +13,11 @@ from svev.serving.certificates import make_certificate
 def certificate(
     name: Annotated[
         list[str],
-        typer.Option(help="name or address by which others call this computer, e.g. hillpc.local; repeatable"),
+        typer.Option(
+            metavar="NAME", help="name or address by which others call this computer, e.g. hillpc.local; repeatable"
+        ),
     ],
-    out: Annotated[Path, typer.Option(help="folder for the files, made if missing")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="folder for the files, made if missing")],
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Make a certificate for HTTPS, signed by an authority (CA) of your own, which phones are told to trust once.

@@ -12,7 +12,9 @@ COMPLETE_VARIABLE = "_SVEV_COMPLETE"
 
 
 def completion(
-    shell: Annotated[Literal["bash", "zsh", "fish"], typer.Argument(help="your shell")] = "bash",
+    shell: Annotated[
+        Literal["bash", "zsh", "fish"], typer.Argument(metavar="bash|zsh|fish", help="your shell")
+    ] = "bash",
 ) -> None:
     """Print what makes a shell complete the commands and options of svev when you press the tabulator.
 

@@ -35,32 +35,45 @@ _UNIT = Path("/usr/local/lib/systemd/system/svev.service"), Path("/lib/systemd/s
 def setup(
     folder: Annotated[
         Path | None,
-        typer.Option(help="of the files; /etc/svev with root, ~/svev-hill without, if left out", show_default=False),
+        typer.Option(
+            metavar="DIR",
+            help="of the files; /etc/svev with root, ~/svev-hill without, if left out",
+            show_default=False,
+        ),
     ] = None,
-    language: Annotated[str | None, typer.Option(help="of the questions: en or nb")] = None,
-    name: Annotated[str | None, typer.Option(help="of the hill")] = None,
+    language: Annotated[str | None, typer.Option(metavar="en|nb", help="of the questions: en or nb")] = None,
+    name: Annotated[str | None, typer.Option(metavar="NAME", help="of the hill")] = None,
     camera: Annotated[
         list[str] | None,
-        typer.Option(help="address of a camera, or NAME=ADDRESS; repeatable, from left to right"),
+        typer.Option(metavar="ADDRESS", help="address of a camera, or NAME=ADDRESS; repeatable, from left to right"),
     ] = None,
     network: Annotated[
-        str | None, typer.Option(help="look for GigE Vision cameras in this network only, e.g. 192.168.11.0/24")
+        str | None,
+        typer.Option(metavar="NETWORK", help="look for GigE Vision cameras in this network only, e.g. 192.168.11.0/24"),
     ] = None,
     trigger: Annotated[
         str | None,
-        typer.Option(help="who makes the pulses: external, triggerbox, gpio, action, iidc-broadcast or software"),
+        typer.Option(
+            metavar="SOURCE",
+            help="who makes the pulses: external, triggerbox, gpio, action, iidc-broadcast or software",
+        ),
     ] = None,
-    rate: Annotated[str | None, typer.Option(help="pulses per second")] = None,
-    trigger_input: Annotated[str | None, typer.Option(help="input of GigE Vision cameras with the cable")] = None,
-    trigger_port: Annotated[str | None, typer.Option(help="device file of a trigger box")] = None,
-    trigger_line: Annotated[str | None, typer.Option(help="line of this computer that makes the pulses")] = None,
-    survey: Annotated[str | None, typer.Option(help='file of the surveyed balls, or "none"')] = None,
-    recordings: Annotated[str | None, typer.Option(help="folder of the recordings")] = None,
+    rate: Annotated[str | None, typer.Option(metavar="HZ", help="pulses per second")] = None,
+    trigger_input: Annotated[
+        str | None, typer.Option(metavar="NAME", help="input of GigE Vision cameras with the cable")
+    ] = None,
+    trigger_port: Annotated[str | None, typer.Option(metavar="FILE", help="device file of a trigger box")] = None,
+    trigger_line: Annotated[
+        str | None, typer.Option(metavar="LINE", help="line of this computer that makes the pulses")
+    ] = None,
+    survey: Annotated[str | None, typer.Option(metavar="FILE", help='file of the surveyed balls, or "none"')] = None,
+    recordings: Annotated[str | None, typer.Option(metavar="DIR", help="folder of the recordings")] = None,
     phones: Annotated[
         bool | None, typer.Option("--phones/--no-phones", help="whether other computers reach the page")
     ] = None,
     call: Annotated[
-        list[str] | None, typer.Option(help="name or address by which they call this computer; repeatable")
+        list[str] | None,
+        typer.Option(metavar="NAME", help="name or address by which they call this computer; repeatable"),
     ] = None,
     https: Annotated[bool | None, typer.Option("--https/--no-https", help="whether the page has a certificate")] = None,
     yes: Annotated[

@@ -15,17 +15,28 @@ from svev.doctor.examination import Probe, firewire_probes, probes, run_probe
 from svev.doctor.finding import Finding, Topic
 from svev.doctor.printing import counts_of, end_with, print_findings
 from svev.doctor.webhook import send_test, target_of
+from svev.overwriting import ForceOption, refuse_existing
 
 
 def doctor(
     rig: Annotated[
         Path | None,
-        typer.Option(help="rig file to examine the computer for; the simulated hill if left out", show_default=False),
+        typer.Option(
+            metavar="RIG.toml",
+            help="rig file to examine the computer for; the simulated hill if left out",
+            show_default=False,
+        ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="folder of the recordings; the rig file's if left out")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="folder of the recordings; the rig file's if left out"),
+    ] = None,
     bus: Annotated[
         Literal["firewire"] | None,
-        typer.Option(help="examine this bus only, and try each camera on it: set it up, 2 s of frames, a bus reset"),
+        typer.Option(
+            metavar="firewire",
+            help="examine this bus only, and try each camera on it: set it up, 2 s of frames, a bus reset",
+        ),
     ] = None,
     find: Annotated[
         bool, typer.Option("--find", help="only look for cameras on all networks, and compare them with the rig file")
@@ -79,7 +90,10 @@ def doctor(
 
 
 def schema(
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="write it to this file instead")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="write it to this file instead")
+    ] = None,
+    force: ForceOption = False,
 ) -> None:
     """Print the JSON schema of the rig file, for editors that check and complete TOML while you type.
 
@@ -88,11 +102,14 @@ def schema(
     if output is None:
         console.say_text(rig_schema().rstrip())
     else:
+        refuse_existing(output, force=force)
         output.write_text(rig_schema(), encoding="utf-8")
 
 
 def keys(
-    name: Annotated[Path, typer.Argument(help="beginning of the names of both files, e.g. /etc/svev/hill")],
+    name: Annotated[
+        Path, typer.Argument(metavar="NAME", help="beginning of the names of both files, e.g. /etc/svev/hill")
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Make a pair of keys (ZeroMQ CURVE), so that only programs that have one of them can take published images.

@@ -1,6 +1,5 @@
 """`svev analyze`: measures the jumps of a recording."""
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,27 +12,27 @@ from analysis.procedure.result_folder import write_folder
 from analysis.report.course import course_of
 from analysis.report.figures import five_figures, plus_minus
 from analysis.report.kinogram.earlier import read_earlier
+from analysis.result import file as result_file
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from svev import console
 from svev.commands.logs.contents import AlsoJson, LogPath
-from svev.commands.networks.delivery import NOT_CONVERGED, NOT_SOLVABLE, PosesOption, SurveyOption
-
-
-class Alternative(StrEnum):
-    """Which points tie the images of the cameras together (paper, step 2)."""
-
-    BALLS = "1"
-    HELMET_TOO = "2"
+from svev.commands.networks.delivery import (
+    NOT_CONVERGED,
+    NOT_SOLVABLE,
+    Alternative,
+    AlternativeOption,
+    PosesOption,
+    SurveyOption,
+)
+from svev.overwriting import ForceOption, refuse_existing
 
 
 def analyze_command(
     log: LogPath,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="folder for the results")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="folder for the results")],
     survey: SurveyOption = None,
     calibration: PosesOption = None,
-    alternative: Annotated[
-        Alternative, typer.Option(help="1: balls alone orient the cameras; 2: the moving helmet too")
-    ] = Alternative.BALLS,
+    alternative: AlternativeOption = Alternative.STATIC,
     measurements: Annotated[
         Path | None, typer.Option(metavar="FILE", help="compute from these measurements; do not look at the jumper")
     ] = None,
@@ -45,6 +44,7 @@ def analyze_command(
         typer.Option(metavar="DIR", help="result of an earlier jump of this athlete, for the marks of the kinogram"),
     ] = None,
     video: Annotated[bool, typer.Option("--video", help="write the overlay video too")] = False,
+    force: ForceOption = False,
     as_json: AlsoJson = False,
 ) -> None:
     """Measure the jumps of a recording: points, skis, angles, height and speed, each with its sigma.
@@ -57,6 +57,7 @@ def analyze_command(
 
     Example: svev analyze recordings/jump.mcap --survey hill.json --out results/jump
     """
+    refuse_existing(out / result_file.NAME, force=force)
     source = read_source(survey, calibration)
     by_hand_only = None if measurements is None else read_measurements(measurements)
     more = None if by_hand is None else read_measurements(by_hand)
@@ -68,7 +69,7 @@ def analyze_command(
                 source,
                 by_hand=more if by_hand_only is None else by_hand_only,
                 images=by_hand_only is None,
-                helmet=alternative is Alternative.HELMET_TOO,
+                helmet=alternative is Alternative.MOVING_TOO,
                 progress=tell,
             )
         except (NotSolvableError, NotConvergedError) as error:

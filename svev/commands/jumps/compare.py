@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -19,22 +19,30 @@ from analysis.result.model import MeasuredRecording
 from rig.api.comparison import PageLanguage
 from rig.errors import BadInputError
 from svev import console
+from svev.overwriting import ForceOption, refuse_existing
 
-_Folder = Annotated[Path, typer.Argument(help="folder that svev analyze wrote, or its jumper.json")]
+_FOLDER: Final = "folder that svev analyze wrote, or its jumper.json"
 
 
 def compare(
-    dir_a: _Folder,
-    dir_b: _Folder,
-    out: Annotated[Path, typer.Option("--out", help="folder for comparison.json and comparison.html")],
-    jump_a: Annotated[int, typer.Option("--jump-a", min=1, help="number of the jump in DIR_A")] = 1,
-    jump_b: Annotated[int, typer.Option("--jump-b", min=1, help="number of the jump in DIR_B")] = 1,
+    dir_a: Annotated[Path, typer.Argument(metavar="DIR_A", help=_FOLDER, show_default=False)],
+    dir_b: Annotated[Path, typer.Argument(metavar="DIR_B", help=_FOLDER, show_default=False)],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="folder for comparison.json and comparison.html")
+    ],
+    jump_a: Annotated[int, typer.Option("--jump-a", metavar="N", min=1, help="number of the jump in DIR_A")] = 1,
+    jump_b: Annotated[int, typer.Option("--jump-b", metavar="N", min=1, help="number of the jump in DIR_B")] = 1,
     also: Annotated[
-        list[Path] | None, typer.Option("--also", help="further jumps, for the athlete's own scatter; may be repeated")
+        list[Path] | None,
+        typer.Option("--also", metavar="DIR", help="further jumps, for the athlete's own scatter; may be repeated"),
     ] = None,
     language: Annotated[
-        PageLanguage, typer.Option("--language", help="that the page shows first; a reader can choose the other one")
+        PageLanguage,
+        typer.Option(
+            "--language", metavar="en|nb", help="that the page shows first; a reader can choose the other one"
+        ),
     ] = PageLanguage.EN,
+    force: ForceOption = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="end with one JSON object: the result without series")
     ] = False,
@@ -47,6 +55,7 @@ def compare(
 
     Example: svev compare monday tuesday --also wednesday --out compared
     """
+    refuse_existing(out / "comparison.json", out / "comparison.html", force=force)
     recordings = {path: read(path) for path in dict.fromkeys((dir_a, dir_b))}
     twice = _read_further(also or (), recordings)
     if recordings[dir_a] is recordings[dir_b] and jump_a == jump_b:

@@ -29,9 +29,12 @@ def digitize_command(
     log: LogPath,
     survey: SurveyOption = None,
     calibration: PosesOption = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="port of the page; 0: any that is free")] = 0,
+    port: Annotated[
+        int, typer.Option(metavar="PORT", min=0, max=65535, help="port of the page; 0: any that is free")
+    ] = 0,
     marks: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="folder for what is measured; beside the log if left out")
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="folder for what is measured; beside the log if left out"),
     ] = None,
     landmarks: Annotated[
         Path | None,

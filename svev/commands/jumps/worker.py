@@ -42,7 +42,8 @@ def worker_command(
         str, typer.Option("--bind", metavar="ADDRESS", help="where to publish what is measured")
     ] = "tcp://127.0.0.1:5557",
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="folder for a file RECORDING-N.json of each measured jump")
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="folder for a file RECORDING-N.json of each measured jump"),
     ] = None,
     idle: Annotated[
         float | None, typer.Option(metavar="S", min=0.5, help="end when nothing has come for so long; else by Ctrl-C")

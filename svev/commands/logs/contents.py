@@ -114,7 +114,9 @@ def verify_command(
 
 def recover_command(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="the log; it is only read", show_default=False)],
-    out: Annotated[Path, typer.Option("-o", "--out", help="the new log; must not exist", show_default=False)],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="LOG", help="the new log; must not exist", show_default=False)
+    ],
     as_json: AlsoJson = False,
 ) -> None:
     """Make a whole log of one that was not closed or is damaged: closed, indexed, everything in it checked.

@@ -13,6 +13,7 @@ from rig.api.export import ENDINGS, ExportOrder, Kind, Quality
 from rig.errors import BadInputError
 from svev import console
 from svev.commands.logs.contents import AlsoJson, LogPath, check_pulses
+from svev.overwriting import ForceOption, refuse_existing
 
 _FILES: Final = {".mp4": Kind.H264, ".mkv": Kind.FFV1, ".csv": Kind.CSV}
 _VIDEOS: Final = (Kind.H264, Kind.FFV1)
@@ -30,6 +31,7 @@ def export_command(
     out: Annotated[
         Path,
         typer.Option(
+            "-o",
             "--out",
             metavar="FILE|DIR",
             help="X.mp4: H.264; X.mkv: FFV1 without loss; X.csv: table of tags; otherwise a new folder for pictures",
@@ -42,15 +44,22 @@ def export_command(
     separate: Annotated[bool, typer.Option("--separate", help="a video for each camera: X_K1.mp4, ...")] = False,
     first: Annotated[int | None, typer.Option("--from", metavar="PULSE", help="first pulse")] = None,
     last: Annotated[int | None, typer.Option("--to", metavar="PULSE", help="last pulse")] = None,
-    slow: Annotated[float, typer.Option("--slow", min=1, max=10, help="so many times slower (videos)")] = 1.0,
-    quality: Annotated[Quality, typer.Option("--quality", help="of H.264; the worse, the smaller")] = Quality.GOOD,
+    slow: Annotated[
+        float, typer.Option("--slow", metavar="X", min=1, max=10, help="so many times slower (videos)")
+    ] = 1.0,
+    quality: Annotated[
+        Quality, typer.Option("--quality", metavar="small|good|best", help="of H.264; the worse, the smaller")
+    ] = Quality.GOOD,
     burn_in: Annotated[
         bool, typer.Option("--burn-in", help="write bib, pulse and time into the pictures (videos)")
     ] = False,
-    images: Annotated[Images, typer.Option("--images", help="format of pictures in a folder")] = Images.PNG,
+    images: Annotated[
+        Images, typer.Option("--images", metavar="png|tiff", help="format of pictures in a folder")
+    ] = Images.PNG,
     contact_sheet: Annotated[
         bool, typer.Option("--contact-sheet", help="only a page with triplets of the jump; OUT is a .png")
     ] = False,
+    force: ForceOption = False,
     as_json: AlsoJson = False,
 ) -> None:
     """Export a recording: a video for people or without loss, pictures of each camera, a table, a contact sheet.
@@ -76,7 +85,9 @@ def export_command(
         raise BadInputError(f"{error.errors()[0]['loc'][0]}: {error.errors()[0]['msg']}; see --help") from None
     written: list[Path] = []
     pulses = 0
-    for part, file in _parts(log, order, out, separate=separate):
+    parts = _parts(log, order, out, separate=separate)
+    refuse_existing(*(file for _, file in parts), force=force)
+    for part, file in parts:
         pulses = _export(log, part, file)
         written.append(file)
         console.say(f"{file}: {pulses} pulses", aside=as_json)

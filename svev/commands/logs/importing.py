@@ -18,13 +18,14 @@ from rig.settings.trigger import TriggerSettings
 from service.recordings.control import read_calibration
 from svev import console
 from svev.commands.logs.contents import AlsoJson, check_pulses
+from svev.overwriting import ForceOption
 
 
 def import_command(
     films: Annotated[
         list[str],
         typer.Argument(
-            metavar="FOLDER|VIDEO...",
+            metavar="FOLDER|VIDEO",
             show_default=False,
             help="folder of images or video of each camera, from left to right; NAME=PATH names the camera",
         ),
@@ -53,7 +54,7 @@ def import_command(
     date: Annotated[
         str | None, typer.Option("--date", metavar="TIME", help="of the common start, as 2009-02-14T12:30:00+01:00")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="put the log in the place of a file of its name")] = False,
+    force: ForceOption = False,
     as_json: AlsoJson = False,
 ) -> None:
     """Make a log of image sequences or videos that other cameras took, so that films of other years can be measured.

@@ -14,7 +14,9 @@ from svev.commands.logs.contents import AlsoJson
 def merge_command(
     first: Annotated[Path, typer.Argument(metavar="A", help="a log; its times stay as they are", show_default=False)],
     second: Annotated[Path, typer.Argument(metavar="B", help="the log of the other computer", show_default=False)],
-    out: Annotated[Path, typer.Option("-o", "--out", help="the new log; must not exist", show_default=False)],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="LOG", help="the new log; must not exist", show_default=False)
+    ],
     as_json: AlsoJson = False,
 ) -> None:
     """Make one log of two that two computers recorded of the same pulses, with the cameras of both.

@@ -28,7 +28,8 @@ def replay_command(
     last: Annotated[int | None, typer.Option("--to", metavar="N", min=1, help="last pulse")] = None,
     wait: Annotated[float, typer.Option(metavar="S", min=0, help="seconds to wait for the first listener")] = 10.0,
     curve_key_file: Annotated[
-        Path | None, typer.Option(help="secret keys (svev keys): serve only those who have the public key")
+        Path | None,
+        typer.Option(metavar="FILE", help="secret keys (svev keys): serve only those who have the public key"),
     ] = None,
     as_json: AlsoJson = False,
 ) -> None:

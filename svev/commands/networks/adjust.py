@@ -36,11 +36,12 @@ from svev.commands.networks.delivery import (
     with_weights,
     written,
 )
+from svev.overwriting import ForceOption, in_report, refuse_existing
 
 
 def adjust(
     context: typer.Context,
-    network: Annotated[Path, typer.Argument(help="network file (svev-network/1)")],
+    network: Annotated[Path, typer.Argument(metavar="NETWORK.json", help="network file (svev-network/1)")],
     output: OutputOption,
     reweight: ReweightOption = False,
     paper: PaperOption = False,
@@ -52,9 +53,12 @@ def adjust(
     covariance: CovarianceOption = None,
     datum: Annotated[
         list[str] | None,
-        typer.Option("--datum", help="give the sigmas of a free network in the datum of these points; repeatable"),
+        typer.Option(
+            "--datum", metavar="NAME", help="give the sigmas of a free network in the datum of these points; repeatable"
+        ),
     ] = None,
     report: ReportOption = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Adjust a network of images: bundle adjustment with covariance, tests and variance components.
@@ -65,6 +69,7 @@ def adjust(
     Example: svev adjust network.json -o result.json
     """
     refuse_overwriting(output, network)
+    refuse_existing(output, *in_report(report), force=force)
     given = with_weights(read_network(network), reweight=reweight, paper=paper)
     came_from = origin(context, network=network)
     named_points(given, datum or (), "--datum")  # before anything is computed

@@ -24,6 +24,7 @@ from svev.commands.networks.delivery import (
     written,
 )
 from svev.commands.networks.layout import BoardOption, SquareOption, TargetOption, columns_and_rows
+from svev.overwriting import ForceOption, in_report, refuse_existing
 
 
 def calibrate(
@@ -40,7 +41,8 @@ def calibrate(
         Path | None,
         typer.Option(
             "-o",
-            "--output",
+            "--out",
+            metavar="FILE|DIR",
             help="result file (svev-adjustment/1) to write; with --pictures the folder for calibration.json, "
             "network.json and the report (calibration, if left out)",
         ),
@@ -57,11 +59,12 @@ def calibrate(
     ] = None,
     flat: Annotated[bool, typer.Option("--flat", help="the board is flat (glass, or checked with a ruler)")] = False,
     camera: Annotated[
-        str | None, typer.Option("--camera", help="name of the camera, if its folder has another")
+        str | None, typer.Option("--camera", metavar="NAME", help="name of the camera, if its folder has another")
     ] = None,
     detectable: DetectableOption = False,
     covariance: CovarianceOption = None,
     report: ReportOption = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Calibrate cameras: free adjustment of a frame of unknown targets with self-calibration.
@@ -83,11 +86,21 @@ def calibrate(
             )
         layout = Layout(*columns_and_rows(board), square_mm, target_mm)
         from_pictures(
-            context, network, output or Path("calibration"), layout, distance or (), camera, flat=flat, as_json=as_json
+            context,
+            network,
+            output or Path("calibration"),
+            layout,
+            distance or (),
+            camera,
+            flat=flat,
+            force=force,
+            as_json=as_json,
         )
         return
     if len(network) != 1 or output is None:
         raise BadInputError("name one network file and -o RESULT.json, or pictures with --pictures")
+    refuse_overwriting(output, network[0])
+    refuse_existing(output, *in_report(report), force=force)
     _from_network(context, network[0], output, report, covariance, detectable=detectable, as_json=as_json)
 
 
@@ -101,7 +114,6 @@ def _from_network(
     detectable: bool,
     as_json: bool,
 ) -> None:
-    refuse_overwriting(output, network)
     given = read_network(network)
     came_from = origin(context, network=network)
     named_points(given, covariance or (), "--covariance")  # before anything is computed

@@ -16,6 +16,7 @@ from photogrammetry.network.file_writer import write_network
 from rig.errors import BadInputError
 from svev import console
 from svev.commands.networks.delivery import as_record, deliver, origin, written
+from svev.overwriting import in_report, refuse_existing
 
 _DISTANCE: Final = re.compile(r"([BT][0-9a-d-]+),([BT][0-9a-d-]+),(\d+(?:\.\d+)?)(?:,(\d+(?:\.\d+)?))?")
 _SIGMA_MM: Final = 0.5  # of a distance measured with a tape or ruler
@@ -30,6 +31,7 @@ def from_pictures(
     camera: str | None,
     *,
     flat: bool,
+    force: bool,
     as_json: bool,
 ) -> None:
     """Find targets, write the network, adjust it, write calibration and report into a folder.
@@ -39,10 +41,11 @@ def from_pictures(
         typer.Exit: 3 not solvable, 4 not converged or refused.
     """
     measured = [_distance(words) for words in distances]
+    network_file, result_file = out / "network.json", out / "calibration.json"
+    refuse_existing(network_file, result_file, *in_report(out), force=force)
     with console.progress("pictures", None) as done:
         pictures, left_out = read_pictures(paths, layout, camera, done)
     out.mkdir(parents=True, exist_ok=True)
-    network_file, result_file = out / "network.json", out / "calibration.json"
 
     def calibrated() -> tuple[dict[str, Any], list[str]]:
         made = calibrate_pictures(pictures, layout, measured, flat=flat)

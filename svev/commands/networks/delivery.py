@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -17,14 +18,34 @@ from photogrammetry.reports.result_file import failure_to_json, write_result
 from rig.errors import BadInputError
 from svev import console
 
-OutputOption = Annotated[Path, typer.Option("-o", "--output", help="result file (svev-adjustment/1) to write")]
-ReportOption = Annotated[Path | None, typer.Option("--report", help="folder for the report, as text and as a page")]
+OutputOption = Annotated[
+    Path, typer.Option("-o", "--out", metavar="FILE", help="result file (svev-adjustment/1) to write")
+]
+ReportOption = Annotated[
+    Path | None, typer.Option("--report", metavar="DIR", help="folder for the report, as text and as a page")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="end with one JSON object: the result without its lists")]
 SurveyOption = Annotated[
     Path | None, typer.Option("--survey", metavar="SURVEY.json", help="survey of the balls with interior orientations")
 ]
 PosesOption = Annotated[
     Path | None, typer.Option("--calibration", metavar="POSES.json", help="poses of the cameras, result of svev orient")
+]
+
+
+class Alternative(StrEnum):
+    """Which points tie the images of the cameras together (paper, step 2)."""
+
+    STATIC = "1"
+    MOVING_TOO = "2"
+
+
+#: Of `orient` and `analyze`; the default of both is that of the paper's first alternative.
+AlternativeOption = Annotated[
+    Alternative,
+    typer.Option(
+        "--alternative", metavar="1|2", help="1: static points alone orient the cameras; 2: the moving helmet too"
+    ),
 ]
 ReweightOption = Annotated[
     bool,
@@ -37,7 +58,9 @@ DetectableOption = Annotated[
 ]
 CovarianceOption = Annotated[
     list[str] | None,
-    typer.Option("--covariance", help="add the joint covariance of points with this name (* and ?); repeatable"),
+    typer.Option(
+        "--covariance", metavar="NAME", help="add the joint covariance of points with this name (* and ?); repeatable"
+    ),
 ]
 PaperOption = Annotated[bool, typer.Option("--paper", help="estimate the weights by D5 as the paper prints it")]
 
@@ -58,7 +81,7 @@ def origin(context: typer.Context, **files: Path | None) -> Provenance:
     options = [
         f"--{name.replace('_', '-')}" if value is True else f"--{name.replace('_', '-')} {each}"
         for name, value in context.params.items()
-        if name not in files and not isinstance(value, Path) and value not in (None, False)
+        if name not in (*files, "force") and not isinstance(value, Path) and value not in (None, False)
         for each in (value if isinstance(value, list | tuple) else (value,))
     ]
     return provenance(" ".join(("svev", str(context.info_name), *options)), files)

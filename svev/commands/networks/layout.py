@@ -8,9 +8,11 @@ import typer
 from rig.errors import BadInputError
 
 BoardOption = Annotated[str, typer.Option("--board", metavar="COLUMNSxROWS", help="squares of the board")]
-SquareOption = Annotated[float, typer.Option("--square-mm", min=1.0, max=1000.0, help="side of the board's squares")]
+SquareOption = Annotated[
+    float, typer.Option("--square-mm", metavar="MM", min=1.0, max=1000.0, help="side of the board's squares")
+]
 TargetOption = Annotated[
-    float, typer.Option("--target-mm", min=1.0, max=1000.0, help="side of a single target's white square")
+    float, typer.Option("--target-mm", metavar="MM", min=1.0, max=1000.0, help="side of a single target's white square")
 ]
 
 

@@ -1,7 +1,6 @@
 """`svev orient`: poses of the cameras on the hill."""
 
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +13,8 @@ from photogrammetry.reports.adjusted import Wishes
 from photogrammetry.reports.procedures import orientation_lines, orientation_report, orientation_to_json
 from photogrammetry.reports.result_extras import named_points
 from svev.commands.networks.delivery import (
+    Alternative,
+    AlternativeOption,
     CovarianceOption,
     DetectableOption,
     JsonOption,
@@ -29,27 +30,28 @@ from svev.commands.networks.delivery import (
     with_weights,
     written,
 )
-
-
-class Alternative(StrEnum):
-    """Which tie points are used."""
-
-    STATIC = "1"
-    MOVING_TOO = "2"
+from svev.overwriting import ForceOption, in_report, refuse_existing
 
 
 def orient(
     context: typer.Context,
-    network: Annotated[Path, typer.Argument(help="network file (svev-network/1) with reference points")],
+    network: Annotated[
+        Path, typer.Argument(metavar="NETWORK.json", help="network file (svev-network/1) with reference points")
+    ],
     output: OutputOption,
     calibration: Annotated[
         Path | None,
-        typer.Option("--calibration", help="result file of svev calibrate; if left out, the network's own cameras"),
+        typer.Option(
+            "--calibration",
+            metavar="FILE",
+            help="result file of svev calibrate; if left out, the network's own cameras",
+        ),
     ] = None,
-    alternative: Annotated[
-        Alternative, typer.Option("--alternative", help="1: static tie points only; 2: moving tie points too")
-    ] = Alternative.MOVING_TOO,
-    moving: Annotated[str, typer.Option("--moving", help="pattern of the moving points' names (* and ?)")] = "H*",
+    alternative: AlternativeOption = Alternative.STATIC,
+    moving: Annotated[
+        str | None,
+        typer.Option("--moving", metavar="PATTERN", help="names of the moving points (* and ?); H* if left out"),
+    ] = None,
     uncertain_interior: Annotated[
         bool,
         typer.Option(
@@ -62,6 +64,7 @@ def orient(
     detectable: DetectableOption = False,
     covariance: CovarianceOption = None,
     report: ReportOption = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Estimate the cameras' poses from reference points, with a search for gross errors in three stages.
@@ -72,6 +75,7 @@ def orient(
     Example: svev orient hill.json --calibration cameras.json -o poses.json --report orientation
     """
     refuse_overwriting(output, network, calibration)
+    refuse_existing(output, *in_report(report), force=force)
     given = read_network(network)
     left_out: list[str] = []
     if calibration is not None:

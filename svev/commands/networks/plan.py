@@ -16,27 +16,32 @@ from photogrammetry.reports.document import as_text
 from photogrammetry.reports.plan import plan_report, plan_to_json
 from svev import console
 from svev.commands.networks.delivery import NOT_CONVERGED, NOT_SOLVABLE, refuse_overwriting, written
+from svev.overwriting import ForceOption, in_report, refuse_existing
 
 _SEED: Final = 2009
 
 
 def plan(
-    network: Annotated[Path, typer.Argument(help="planned network (TOML), e.g. config/networks/hill-1.toml")],
+    network: Annotated[
+        Path, typer.Argument(metavar="PLAN.toml", help="planned network (TOML), e.g. config/networks/hill-1.toml")
+    ],
     samples: Annotated[
-        int, typer.Option(min=100, max=100_000, help="repetitions of the Monte-Carlo simulation")
+        int, typer.Option(metavar="N", min=100, max=100_000, help="repetitions of the Monte-Carlo simulation")
     ] = SAMPLES,
     report: Annotated[
-        Path | None, typer.Option("--report", help="folder for the report, as text and as a page with drawings")
+        Path | None,
+        typer.Option("--report", metavar="DIR", help="folder for the report, as text and as a page with drawings"),
     ] = None,
     simulated_file: Annotated[
         Path | None,
         typer.Option(
             "--simulate",
-            metavar="NETWORK.json",
+            metavar="FILE",
             help="instead of predicting, write a network with errors (svev-network/1), as it would be measured",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="of the random errors")] = _SEED,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the random errors")] = _SEED,
+    force: ForceOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object instead of the tables")] = False,
 ) -> None:
     """Predict the accuracy of cameras, jumper points, skis and body angles, by covariance and by Monte Carlo.
@@ -45,9 +50,11 @@ def plan(
 
     Example: svev plan config/networks/hill-2.toml --report plan
     """
-    planned = plan_from(read_description(network))
     if simulated_file is not None:
         refuse_overwriting(simulated_file, network)
+    refuse_existing(simulated_file, *in_report(report), force=force)
+    planned = plan_from(read_description(network))
+    if simulated_file is not None:
         _simulate(planned, seed, simulated_file, as_json=as_json)
         return
     try:

@@ -11,6 +11,7 @@ from analysis.targets.sheets import board_page, target_pages
 from svev import console
 from svev.commands.networks.delivery import JsonOption
 from svev.commands.networks.layout import BoardOption, SquareOption, TargetOption, columns_and_rows
+from svev.overwriting import ForceOption, refuse_existing
 
 _PRINT = (
     "print at 100 % (not to fit the page), measure the line at the foot of each page, glue the board to a flat plate"
@@ -23,8 +24,12 @@ def target(
     square_mm: SquareOption = 30.0,
     target_mm: TargetOption = 80.0,
     targets: Annotated[
-        int, typer.Option("--targets", min=1, max=LAST_SINGLE - FIRST_SINGLE + 1, help="how many single targets")
+        int,
+        typer.Option(
+            "--targets", metavar="N", min=1, max=LAST_SINGLE - FIRST_SINGLE + 1, help="how many single targets"
+        ),
     ] = 24,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make targets to print: a ChArUco board, and single coded targets for a frame in space, as PDF of exact size.
@@ -37,6 +42,7 @@ def target(
     layout = Layout(columns, rows, square_mm, target_mm)
     files = {"board.pdf": [board_page(layout)]}
     files["targets.pdf"] = target_pages(layout, range(FIRST_SINGLE, FIRST_SINGLE + targets))
+    refuse_existing(*(out / name for name in files), force=force)
     out.mkdir(parents=True, exist_ok=True)
     for name, pages in files.items():
         (out / name).write_bytes(pdf(pages))

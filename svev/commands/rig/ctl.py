@@ -46,19 +46,28 @@ app.add_typer(start_list_app, name="startlist")
 app.command()(log)
 app.command()(doctor)
 
-Id = Annotated[str, typer.Argument(help="id of the recording, see svev ctl list")]
+Id = Annotated[str, typer.Argument(metavar="ID", help="id of the recording, see svev ctl list")]
 Wait = Annotated[
-    float, typer.Option("--wait", min=0, max=600, help="wait at most so long until it is done; 0: not at all")
+    float,
+    typer.Option("--wait", metavar="S", min=0, max=600, help="wait at most so long until it is done; 0: not at all"),
 ]
-Text = Annotated[str | None, typer.Option()]
+Athlete = Annotated[str | None, typer.Option(metavar="NAME", help="who jumps")]
+Bib = Annotated[str | None, typer.Option(metavar="TEXT", help="number on the jumper's bib")]
+Gate = Annotated[str | None, typer.Option(metavar="TEXT", help="start gate")]
+Wind = Annotated[str | None, typer.Option(metavar="TEXT", help="wind, in whatever words you use")]
+Notes = Annotated[str | None, typer.Option(metavar="TEXT", help="anything else that should stand with the jump")]
+Operator = Annotated[str | None, typer.Option(metavar="NAME", help="who records")]
 
 
 @app.callback()
 def _target(
     context: typer.Context,
-    url: Annotated[str, typer.Option(envvar="SVEV_URL", help="address of the service")] = "http://127.0.0.1:8000",
+    url: Annotated[
+        str, typer.Option(metavar="URL", envvar="SVEV_URL", help="address of the service")
+    ] = "http://127.0.0.1:8000",
     token_file: Annotated[
-        Path | None, typer.Option(help="file that holds the token; without it, the variable SVEV_TOKEN is used")
+        Path | None,
+        typer.Option(metavar="FILE", help="file that holds the token; without it, the variable SVEV_TOKEN is used"),
     ] = None,
 ) -> None:
     """Operate a running service (svev serve): arm, record, stop, list."""
@@ -78,7 +87,8 @@ def status(context: typer.Context, as_json: Json = False) -> None:
 def arm(
     context: typer.Context,
     min_cameras: Annotated[
-        int | None, typer.Option(min=1, max=8, help="so many are enough this time; as the rig file says if left out")
+        int | None,
+        typer.Option(metavar="N", min=1, max=8, help="so many are enough this time; as the rig file says if left out"),
     ] = None,
     wait_s: Wait = 60.0,
     as_json: Json = False,
@@ -105,17 +115,17 @@ def disarm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -
 def start(
     context: typer.Context,
     preroll: Annotated[
-        float | None, typer.Option(min=0, help="begin so many seconds ago; all that are held if left out")
+        float | None, typer.Option(metavar="S", min=0, help="begin so many seconds ago; all that are held if left out")
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(min=0, help="end after so many seconds; when stopped if left out")
+        float | None, typer.Option(metavar="S", min=0, help="end after so many seconds; when stopped if left out")
     ] = None,
-    athlete: Text = None,
-    bib: Text = None,
-    gate: Text = None,
-    wind: Text = None,
-    notes: Text = None,
-    operator: Text = None,
+    athlete: Athlete = None,
+    bib: Bib = None,
+    gate: Gate = None,
+    wind: Wind = None,
+    notes: Notes = None,
+    operator: Operator = None,
     as_json: Json = False,
 ) -> None:
     """Start recording.
@@ -145,7 +155,7 @@ def measure(context: typer.Context, recording: Id, wait_s: Wait = 0.0, as_json: 
 def stop(
     context: typer.Context,
     recording: Annotated[
-        str, typer.Argument(help="id; the recording in progress if left out", show_default=False)
+        str, typer.Argument(metavar="ID", help="id; the recording in progress if left out", show_default=False)
     ] = "",
     as_json: Json = False,
 ) -> None:
@@ -165,14 +175,14 @@ def stop(
 def save(
     context: typer.Context,
     seconds: Annotated[
-        float | None, typer.Option(min=0, help="the last so many seconds; all that are held if left out")
+        float | None, typer.Option(metavar="S", min=0, help="the last so many seconds; all that are held if left out")
     ] = None,
-    athlete: Text = None,
-    bib: Text = None,
-    gate: Text = None,
-    wind: Text = None,
-    notes: Text = None,
-    operator: Text = None,
+    athlete: Athlete = None,
+    bib: Bib = None,
+    gate: Gate = None,
+    wind: Wind = None,
+    notes: Notes = None,
+    operator: Operator = None,
     as_json: Json = False,
 ) -> None:
     """Save what has just happened: record the last seconds, which are held in memory.
@@ -188,7 +198,9 @@ def save(
 @app.command("list")
 def list_(
     context: typer.Context,
-    search: Annotated[str, typer.Option(help="only those in which all these words stand: id, bib, athlete, tags")] = "",
+    search: Annotated[
+        str, typer.Option(metavar="WORDS", help="only those in which all these words stand: id, bib, athlete, tags")
+    ] = "",
     deleted: Annotated[bool, typer.Option("--deleted", help="list the recordings in the trash instead")] = False,
     as_json: Json = False,
 ) -> None:
@@ -205,12 +217,12 @@ def list_(
 def session(
     context: typer.Context,
     recording: Id,
-    athlete: Text = None,
-    bib: Text = None,
-    gate: Text = None,
-    wind: Text = None,
-    notes: Text = None,
-    operator: Text = None,
+    athlete: Athlete = None,
+    bib: Bib = None,
+    gate: Gate = None,
+    wind: Wind = None,
+    notes: Notes = None,
+    operator: Operator = None,
     as_json: Json = False,
 ) -> None:
     """Change session fields of a recording; those left out stay.
@@ -224,12 +236,12 @@ def session(
 @app.command("next")
 def next_(
     context: typer.Context,
-    athlete: Text = None,
-    bib: Text = None,
-    gate: Text = None,
-    wind: Text = None,
-    notes: Text = None,
-    operator: Text = None,
+    athlete: Athlete = None,
+    bib: Bib = None,
+    gate: Gate = None,
+    wind: Wind = None,
+    notes: Notes = None,
+    operator: Operator = None,
     as_json: Json = False,
 ) -> None:
     """Show whom the next recording is of, or change it; a bib of the start list makes its jumper the next one.
@@ -262,11 +274,14 @@ def show_start_list(context: typer.Context, as_json: Json = False) -> None:
 @start_list_app.command("load")
 def load_start_list(
     context: typer.Context,
-    table: Annotated[Path, typer.Argument(help="CSV file or Excel workbook, with a line that names the columns")],
+    table: Annotated[
+        Path, typer.Argument(metavar="FILE", help="CSV file or Excel workbook, with a line that names the columns")
+    ],
     encoding: Annotated[
-        str | None, typer.Option(help="of its letters, if they can be read in several ways, e.g. mac-roman")
+        str | None,
+        typer.Option(metavar="NAME", help="of its letters, if they can be read in several ways, e.g. mac-roman"),
     ] = None,
-    sheet: Annotated[str | None, typer.Option(help="of a workbook with several lists")] = None,
+    sheet: Annotated[str | None, typer.Option(metavar="NAME", help="of a workbook with several lists")] = None,
     as_json: Json = False,
 ) -> None:
     """Replace the start list by a table with the columns bib, athlete, gate, club and own ones.
@@ -312,8 +327,10 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
 @app.command()
 def download(
     context: typer.Context,
-    recordings: Annotated[list[str], typer.Argument(help="ids of the recordings, see svev ctl list")],
-    folder: Annotated[Path, typer.Option("-o", "--output", help="folder to put them into")] = Path(),
+    recordings: Annotated[list[str], typer.Argument(metavar="ID", help="ids of the recordings, see svev ctl list")],
+    folder: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="folder to put them into, made if missing")
+    ] = Path(),
     as_json: Json = False,
 ) -> None:
     """Fetch the files of recordings, with their session as it was corrected, and check that they came whole.
@@ -323,8 +340,10 @@ def download(
     Example: svev ctl download 2026-02-14T10-15-30Z -o jumps
     """
     client = client_of(context)
-    if not folder.is_dir():
-        raise BadInputError(f"{folder}: no such folder; make it, or choose another one with -o")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInputError(f"{folder}: cannot be made ({error.strerror}); choose another folder with -o") from None
     found = []
     for recording in recordings:
         with console.progress(f"fetching {recording}", 100) as advance:

@@ -11,9 +11,15 @@ from svev.demo import Bus, run_demo
 
 
 def demo(
-    seconds: Annotated[float, typer.Option(min=0.5, max=3600, help="length of the recording, seconds")] = 10.0,
-    bus: Annotated[Bus, typer.Option(help="how the simulated cameras are connected")] = "gige",
-    out: Annotated[Path, typer.Option(help="folder for the files; made if missing")] = Path("demo"),
+    seconds: Annotated[
+        float, typer.Option(metavar="S", min=0.5, max=3600, help="length of the recording, seconds")
+    ] = 10.0,
+    bus: Annotated[
+        Bus, typer.Option(metavar="gige|firewire|sim", help="how the simulated cameras are connected")
+    ] = "gige",
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="folder for the files; made if missing")
+    ] = Path("demo"),
     analyze: Annotated[bool, typer.Option(help="measure the jumps after recording them")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:

@@ -22,13 +22,13 @@ from svev.neighbours import naming_the_publisher
 
 
 def record(
-    rig: Annotated[Path, typer.Option(help="rig file, e.g. config/rigs/sim.toml")],
-    seconds: Annotated[float, typer.Option(min=0.1, max=86400, help="length of the recording, seconds")],
-    out: Annotated[Path, typer.Option(help="folder for the log; made if missing")],
+    rig: Annotated[Path, typer.Option(metavar="RIG.toml", help="rig file, e.g. config/rigs/sim.toml")],
+    seconds: Annotated[float, typer.Option(metavar="S", min=0.1, max=86400, help="length of the recording, seconds")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="folder for the log; made if missing")],
     allow_absent: Annotated[
         bool, typer.Option(help="record with any camera that answers, whatever trigger.min_cameras says")
     ] = False,
-    session: Annotated[str, typer.Option(help="name of the session, kept in the log")] = "",
+    session: Annotated[str, typer.Option(metavar="TEXT", help="name of the session, kept in the log")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Record once with the cameras of a rig file, for a number of seconds.

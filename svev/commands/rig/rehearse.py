@@ -19,10 +19,17 @@ _TOPICS: Final = tuple(Topic)
 
 
 def rehearse_command(
-    rig: Annotated[Path, typer.Option(help="rig file, e.g. config/rigs/sim.toml")],
-    seconds: Annotated[float, typer.Option(min=0.5, max=600, help="how much is recorded, seconds")] = 5.0,
+    rig: Annotated[Path, typer.Option(metavar="RIG.toml", help="rig file, e.g. config/rigs/sim.toml")],
+    seconds: Annotated[float, typer.Option(metavar="S", min=0.5, max=600, help="how much is recorded, seconds")] = 5.0,
     out: Annotated[
-        Path | None, typer.Option(help="folder of the recordings; the rig file's if left out", show_default=False)
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            metavar="DIR",
+            help="folder of the recordings; the rig file's if left out",
+            show_default=False,
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:

@@ -173,7 +173,7 @@ def test_a_full_disk_is_said_and_nothing_is_left(tmp_path: Path, name: str) -> N
     out = tmp_path / "out"
     out.mkdir()
     (out / "jump.mp4").write_bytes(b"older")
-    options = ["--contact-sheet"] if name == "sheet.png" else []
+    options = ["--force", *(["--contact-sheet"] if name == "sheet.png" else [])]
     command = [sys.executable, "-m", "svev", "export", str(tmp_path / "log.mcap"), "--out", str(out / name), *options]
 
     def small_disk() -> None:

@@ -22,7 +22,7 @@ def run(tmp_path: Path) -> Run:
     def adjust(network: Network, *options: str) -> tuple[int, dict[str, Any]]:
         write_network(network, tmp_path / "network.json")
         result = tmp_path / "result.json"
-        code = main(["adjust", str(tmp_path / "network.json"), "-o", str(result), *options])
+        code = main(["adjust", str(tmp_path / "network.json"), "--force", "-o", str(result), *options])
         return code, json.loads(result.read_text()) if result.exists() else {}
 
     return adjust
@@ -143,7 +143,7 @@ def test_what_does_not_converge_gives_no_numbers(run: Run, capsys: pytest.Captur
 
 def test_bad_input_leaves_no_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "network.json").write_text('{"format": "svev-network/1"}')
-    assert main(["adjust", str(tmp_path / "network.json"), "-o", str(tmp_path / "result.json")]) == 2
+    assert main(["adjust", str(tmp_path / "network.json"), "--force", "-o", str(tmp_path / "result.json")]) == 2
     assert not (tmp_path / "result.json").exists()
     assert "network.json" in capsys.readouterr().err
 
@@ -214,7 +214,7 @@ def test_absurd_numbers_end_in_one_of_four_ways(seed: int, tmp_path: Path) -> No
             place = place[step]
         place[last] = rng.choice([0.0, 1e-30, 1e12, -1e11, -1e6, 1e-10, 10.0 * place[last], -place[last]])
     (tmp_path / "network.json").write_text(json.dumps(data))
-    code = main(["adjust", str(tmp_path / "network.json"), "-o", str(tmp_path / "result.json")])
+    code = main(["adjust", str(tmp_path / "network.json"), "--force", "-o", str(tmp_path / "result.json")])
     assert code in {0, 2, 3, 4}
     assert (tmp_path / "result.json").exists() == (code != 2)
 
@@ -235,7 +235,7 @@ def test_an_absurd_result_is_shown_and_taken_by_no_other_command(
     assert "do not use this result" in capsys.readouterr().err
     write_network(network, tmp_path / "hill.json")
     taken = ["orient", str(tmp_path / "hill.json"), "--calibration", str(tmp_path / "result.json")]
-    assert main([*taken, "-o", str(tmp_path / "poses.json")]) == 2
+    assert main([*taken, "--force", "-o", str(tmp_path / "poses.json")]) == 2
     assert "correct them, do not use this result" in capsys.readouterr().err
     code, result = run(network)
     assert result["global_test"]["usable"] is True

@@ -23,7 +23,7 @@ def run(tmp_path: Path) -> Run:
         write_network(network, tmp_path / "network.json")
         result = tmp_path / "result.json"
         result.unlink(missing_ok=True)
-        main([command, str(tmp_path / "network.json"), "-o", str(result), *options])
+        main([command, str(tmp_path / "network.json"), "--force", "-o", str(result), *options])
         return json.loads(result.read_text()) if result.exists() else {}
 
     return adjust

@@ -17,7 +17,9 @@ _EXPECTED: dict[str, Any] = json.loads((_DATA / "expected.json").read_text())
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("camcal")
-    assert main(["adjust", str(_DATA / "network.json"), "-o", str(folder / "result.json")]) == _EXPECTED["exit"]
+    assert (
+        main(["adjust", str(_DATA / "network.json"), "--force", "-o", str(folder / "result.json")]) == _EXPECTED["exit"]
+    )
     read: dict[str, Any] = json.loads((folder / "result.json").read_text())
     return read
 

@@ -64,7 +64,7 @@ def test_adjust_and_calibrate_say_what_is_beyond_its_linearisation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_network(_weak(3), tmp_path / "hill.json")
-    assert main(["adjust", str(tmp_path / "hill.json"), "-o", str(tmp_path / "result.json")]) == 0
+    assert main(["adjust", str(tmp_path / "hill.json"), "--force", "-o", str(tmp_path / "result.json")]) == 0
     assert "camera K3: y0" in (printed := capsys.readouterr().out)
     assert "is beyond its linearisation: 95 % lie between" in printed
     result = json.loads((tmp_path / "result.json").read_text())
@@ -73,6 +73,6 @@ def test_adjust_and_calibrate_say_what_is_beyond_its_linearisation(
     assert low < result["cameras"]["K3"]["y0"] < high
     assert result["cameras"]["K1"]["interval"] == {}
     write_network(lab_frame(2).network, tmp_path / "frame.json")
-    assert main(["calibrate", str(tmp_path / "frame.json"), "-o", str(tmp_path / "cameras.json")]) == 0
+    assert main(["calibrate", str(tmp_path / "frame.json"), "--force", "-o", str(tmp_path / "cameras.json")]) == 0
     assert "camera K3: y0" in capsys.readouterr().out
     assert set(json.loads((tmp_path / "cameras.json").read_text())["cameras"]["K3"]["interval"]) == {"y0"}

@@ -52,6 +52,6 @@ def test_the_sentence_depends_on_it(
     points = tuple(p if p.sigma is None else replace(p, sigma=p.sigma * factor) for p in network.points)
     network = replace(network, observations=replace(o, sigma=o.sigma * factor), points=points)
     write_network(network, tmp_path / "hill.json")
-    assert main(["adjust", str(tmp_path / "hill.json"), "-o", str(tmp_path / "result.json")]) == 0
+    assert main(["adjust", str(tmp_path / "hill.json"), "--force", "-o", str(tmp_path / "result.json")]) == 0
     assert words in capsys.readouterr().out
     assert json.loads((tmp_path / "result.json").read_text())["global_test"]["verdict"] == verdict

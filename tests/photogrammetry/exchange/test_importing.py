@@ -106,7 +106,7 @@ def test_calibrations_and_surveyed_balls_are_a_survey_for_logs(
     (tmp_path / "balls.csv").write_text("Name;X;Y;Z;Sigma\nB1;0,523;-2,874;-1,871;0,012\nB2;1;2;3;0,02\n")
     (tmp_path / "more.csv").write_text("B3,1,2,3,0.01,0.02,0.03\n# measured on Tuesday\nB4,1,2.5,3,0.01,0.02,0.03\n")
     files = [str(tmp_path / name) for name in ("K1.yml", "K2.yml", "balls.csv", "more.csv")]
-    assert main(["network", "import", *files, "-o", str(tmp_path / "hill.json"), "--json"]) == 0
+    assert main(["network", "import", *files, "--force", "-o", str(tmp_path / "hill.json"), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert (said["cameras"], said["images"], said["points"], said["observations"]) == (2, 0, 4, 0)
     network = read_network(tmp_path / "hill.json")
@@ -332,12 +332,27 @@ def test_the_imported_is_adjusted(tmp_path: Path, capsys: pytest.CaptureFixture[
     ]
     (tmp_path / "balls.csv").write_text("name,X,Y,Z,sigma\n" + "\n".join(balls) + "\n")
     made = tmp_path / "net.json"
-    assert main(["network", "import", str(model), str(tmp_path / "balls.csv"), "--sigma", "0.33", "-o", str(made)]) == 0
+    assert (
+        main(
+            [
+                "network",
+                "import",
+                str(model),
+                str(tmp_path / "balls.csv"),
+                "--sigma",
+                "0.33",
+                "--force",
+                "-o",
+                str(made),
+            ]
+        )
+        == 0
+    )
     assert "note: COLMAP writes no accuracy of image points: 0.33 px assumed" in capsys.readouterr().out
-    assert main(["orient", str(made), "-o", str(tmp_path / "poses.json")]) == 0
+    assert main(["orient", str(made), "--force", "-o", str(tmp_path / "poses.json")]) == 0
     result = json.loads((tmp_path / "poses.json").read_text())
     assert result["global_test"]["verdict"] == "agrees"
-    assert main(["network", "import", str(model), "-o", str(model / "images.txt")]) == 2
+    assert main(["network", "import", str(model), "--force", "-o", str(model / "images.txt")]) == 2
     assert "is an input and would be overwritten" in capsys.readouterr().err
 
 

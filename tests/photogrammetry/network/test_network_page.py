@@ -104,7 +104,7 @@ def test_json_and_toml_are_the_same_network(tmp_path: Path) -> None:
         path.write_text(text)
         networks.append(network_to_json(read_network(path)))
         result = tmp_path / f"{language}-result.json"
-        assert main(["adjust", str(path), "-o", str(result)]) == 0
+        assert main(["adjust", str(path), "--force", "-o", str(result)]) == 0
         assert _result(result)["points"]["B1"]["X"] == pytest.approx([5.0, 0.0, 0.0], abs=0.01)
     assert networks[0] == networks[1]
 
@@ -121,7 +121,7 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path: Path, capsys: pytest
     del data["image_frame"]
     path = tmp_path / "net.json"
     path.write_text(json.dumps(data))
-    assert main(["adjust", str(path), "-o", str(tmp_path / "result.json")]) == 2
+    assert main(["adjust", str(path), "--force", "-o", str(tmp_path / "result.json")]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert said.startswith(f"svev: {path}: 9 things are wrong: (1) ")
@@ -146,9 +146,17 @@ def test_an_input_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFix
     link.hardlink_to(network)
     plan = str(CONFIG / "networks" / "rods.toml")
     for command in (
-        ["adjust", str(network), "-o", str(link)],
-        ["calibrate", str(network), "-o", str(network)],
-        ["orient", str(CONFIG / "networks" / "hill.json"), "--calibration", str(network), "-o", str(network)],
+        ["adjust", str(network), "--force", "-o", str(link)],
+        ["calibrate", str(network), "--force", "-o", str(network)],
+        [
+            "orient",
+            str(CONFIG / "networks" / "hill.json"),
+            "--calibration",
+            str(network),
+            "--force",
+            "-o",
+            str(network),
+        ],
         ["plan", plan, "--simulate", plan],
     ):
         assert main(command) == 2
@@ -160,7 +168,7 @@ def test_an_input_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_a_plan_is_no_network_and_a_network_no_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     networks = CONFIG / "networks"
-    assert main(["adjust", str(networks / "rods.toml"), "-o", str(tmp_path / "result.json")]) == 2
+    assert main(["adjust", str(networks / "rods.toml"), "--force", "-o", str(tmp_path / "result.json")]) == 2
     assert "is a plan; svev plan" in capsys.readouterr().err
     assert main(["plan", str(networks / "rods.json")]) == 2
     assert "it is no plan; svev adjust takes networks" in capsys.readouterr().err

@@ -44,7 +44,7 @@ def _one_image(points: int) -> Network:
 @pytest.mark.parametrize("command", ["adjust", "orient"])
 def test_three_points_fit_several_poses(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_network(_one_image(3), tmp_path / "hill.json")
-    assert main([command, str(tmp_path / "hill.json"), "-o", str(tmp_path / "poses.json")]) == 3
+    assert main([command, str(tmp_path / "hill.json"), "--force", "-o", str(tmp_path / "poses.json")]) == 3
     result = json.loads((tmp_path / "poses.json").read_text())
     assert result["diagnosis"][0]["images"] == ["hill-1"]
     assert "images" not in result

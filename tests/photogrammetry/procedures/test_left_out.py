@@ -106,7 +106,7 @@ def test_plain_adjust_names_the_tie_point_too(tmp_path: Path, capsys: pytest.Cap
     write_network(
         _with_tie(case, dict.fromkeys((0, 1), _far(case, -300.0)), np.random.default_rng(1)), tmp_path / "n.json"
     )
-    assert main(["adjust", str(tmp_path / "n.json"), "-o", str(tmp_path / "result.json")]) == 4
+    assert main(["adjust", str(tmp_path / "n.json"), "--force", "-o", str(tmp_path / "result.json")]) == 4
     assert "tie points without a place, leave them out: T6 in hill-1, hill-2, rays" in capsys.readouterr().out
 
 
@@ -132,7 +132,7 @@ def test_an_image_that_nothing_orients_is_named_and_the_others_are_oriented(
     (told,) = _told(orientation)
     assert told.startswith("not oriented: image hill-3")
     write_network(network, tmp_path / "hill.json")
-    assert main(["orient", str(tmp_path / "hill.json"), "-o", str(tmp_path / "poses.json")]) == 0
+    assert main(["orient", str(tmp_path / "hill.json"), "--force", "-o", str(tmp_path / "poses.json")]) == 0
     assert told in capsys.readouterr().out
     assert list(json.loads((tmp_path / "poses.json").read_text())["images"]) == ["hill-1", "hill-2"]
 

@@ -71,7 +71,7 @@ def test_a_plane_from_afar_has_two_poses_and_none_is_believed(
 ) -> None:
     case = planar(np.random.default_rng(1), 1, 60.0)
     write_network(case.network, tmp_path / "field.json")
-    assert main([command, str(tmp_path / "field.json"), "-o", str(tmp_path / "poses.json")]) == 3
+    assert main([command, str(tmp_path / "field.json"), "--force", "-o", str(tmp_path / "poses.json")]) == 3
     result = json.loads((tmp_path / "poses.json").read_text())
     assert result["diagnosis"][0]["images"] == ["C0"]
     assert "images" not in result

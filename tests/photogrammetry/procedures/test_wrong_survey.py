@@ -114,7 +114,7 @@ def test_snooping_of_a_whole_network_isolates_exchanged_names_too() -> None:
 def test_a_refusal_is_exit_4_and_leaves_no_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     network, result = tmp_path / "hill.json", tmp_path / "poses.json"
     write_network(_spoilt(mirrored, 8).network, network)
-    assert main(["orient", str(network), "-o", str(result)]) == 4
+    assert main(["orient", str(network), "--force", "-o", str(result)]) == 4
     assert capsys.readouterr().out.startswith("refused: the survey is mirrored")
     content = json.loads(result.read_text())
     assert content["converged"] is False

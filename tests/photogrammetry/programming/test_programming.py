@@ -44,7 +44,7 @@ def test_nothing_is_loaded_before_it_is_used() -> None:
 
 
 def test_adjusting_gives_what_the_command_gives(rods: photogrammetry.Result, tmp_path: Path) -> None:
-    assert main(["adjust", str(RODS), "-o", str(tmp_path / "result.json")]) == 0
+    assert main(["adjust", str(RODS), "--force", "-o", str(tmp_path / "result.json")]) == 0
     result = json.loads((tmp_path / "result.json").read_text())
     assert rods.to_json() == result
     assert (rods.sigma0, rods.redundancy) == (result["sigma0"], result["redundancy"])

@@ -44,7 +44,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     calibration = {"format": "svev-adjustment/1", "converged": True, "cameras": cameras}
     (folder / "cameras.json").write_text(json.dumps(calibration))
     command = ["orient", str(folder / "hill.json"), "--calibration", str(folder / "cameras.json")]
-    command += ["-o", str(folder / "poses.json"), "--report", str(folder / "report"), "--covariance", "B1*"]
+    command += ["--force", "-o", str(folder / "poses.json"), "--report", str(folder / "report"), "--covariance", "B1*"]
     assert main([*command, "--detectable"]) == 0
     return folder
 
@@ -73,7 +73,7 @@ def test_origin_names_files_with_their_checksums(record: Path) -> None:
         assert f"{record / name}  {hashlib.sha256((record / name).read_bytes()).hexdigest()}" in origin
     assert f"svev {version('svev')}" in origin
     assert re.search(r"made \d{4}-\d\d-\d\d \d\d:\d\d:\d\d\+00:00", origin)
-    assert "svev orient --covariance B1* --detectable --alternative 2 --moving H*" in origin
+    assert "svev orient --covariance B1* --detectable --alternative 1" in origin
     page = (record / "report" / "protocol.html").read_text()
     assert hashlib.sha256((record / "poses.json").read_bytes()).hexdigest() in page
     assert "Name and signature" in _sections(record)["Signature"]
@@ -234,7 +234,14 @@ def test_digits_follow_the_sigma() -> None:
 
 def test_a_calibration_tells_its_scale_and_what_it_can_find(tmp_path: Path) -> None:
     write_network(lab_frame(2, points=20).network, tmp_path / "frame.json")
-    command = ["calibrate", str(tmp_path / "frame.json"), "-o", str(tmp_path / "cameras.json"), "--detectable"]
+    command = [
+        "calibrate",
+        str(tmp_path / "frame.json"),
+        "--force",
+        "-o",
+        str(tmp_path / "cameras.json"),
+        "--detectable",
+    ]
     assert main([*command, "--report", str(tmp_path / "report")]) == 0
     result = json.loads((tmp_path / "cameras.json").read_text())
     assert len(result["observations"][0]["detectable"]) == len(result["observations"][0]["effect"]) == 2

@@ -69,12 +69,13 @@ def test_a_training_from_the_command_line(tmp_path: Path, loopback: Loopback) ->
         assert _json(_ctl(url, "delete", begun["id"], "--json", token=TOKEN))["deleted"]
         assert len(_json(_ctl(url, "list", "--json", token=TOKEN))["recordings"]) == 1
         assert not _json(_ctl(url, "restore", begun["id"], "--json", token=TOKEN))["deleted"]
-        fetched = _json(_ctl(url, "download", begun["id"], saved["id"], "-o", str(tmp_path), "--json", token=TOKEN))
-        files = [tmp_path / f"18_Ola_{begun['id']}.mcap", tmp_path / f"19_Eva_{saved['id']}.mcap"]
+        folder = tmp_path / "jumps" / "today"  # is made
+        fetched = _json(_ctl(url, "download", begun["id"], saved["id"], "-o", str(folder), "--json", token=TOKEN))
+        files = [folder / f"18_Ola_{begun['id']}.mcap", folder / f"19_Eva_{saved['id']}.mcap"]
         assert fetched == {"files": [str(file) for file in files]}
         assert info(files[0]).session["bib"] == "18"
         assert not verify(files[0]).damaged
-        again = _ctl(url, "download", begun["id"], "-o", str(tmp_path), token=TOKEN)
+        again = _ctl(url, "download", begun["id"], "-o", str(folder), token=TOKEN)
         assert (again.returncode, "exists already" in again.stderr) == (2, True)
         assert _ctl(url, "trash", "--remove", saved["id"], token=TOKEN).returncode == 1
         _ctl(url, "delete", saved["id"], token=TOKEN)

@@ -72,7 +72,8 @@ def test_pictures_of_any_format_and_depth_give_the_same(tmp_path: Path, frame: l
     for ending, levels in ((".png", 1), (".tif", 257), (".bmp", 1)):
         pictures = [picture.astype(np.uint16) * levels if levels > 1 else picture for picture in frame[:4]]
         folder = _written(tmp_path / ending[1:] / "K1", pictures, ending)  # type: ignore[arg-type]
-        assert _calibrate(folder, "-o", tmp_path / "out") == 0
+        assert _calibrate(folder, "-o", tmp_path / "out") == (2 if results else 0), "nothing is overwritten"
+        assert _calibrate(folder, "-o", tmp_path / "out", "--force") == 0
         results.append(read_calibration(tmp_path / "out" / "calibration.json")["K1"].c)
     assert results == pytest.approx([results[0]] * 3, abs=1e-3)
 

@@ -54,7 +54,9 @@ def calibrate(
     distance: Annotated[
         list[str] | None,
         typer.Option(
-            "--distance", metavar="A,B,MM[,SIGMA]", help="measured distance of two corners, for the scale; repeatable"
+            "--distance",
+            metavar="A,B,MM",
+            help="measured distance of two corners, for the scale; a fourth value: sigma, mm; repeatable",
         ),
     ] = None,
     flat: Annotated[bool, typer.Option("--flat", help="the board is flat (glass, or checked with a ruler)")] = False,

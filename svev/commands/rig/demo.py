@@ -1,5 +1,6 @@
 """`svev demo`: record jumps on the simulated hill and measure them."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,6 +52,10 @@ def demo(
     console.say(f"truth              {result['truth']}")
     if result["analysis"] is not None:
         _say_measured(result["analysis"])
+        log, survey = Path(result["log"]), result["analysis"]["survey"]
+        again = ["svev", "analyze", str(log), "--survey", survey, "-o", f"{log.with_suffix('')}-again"]
+        console.say(f"survey             {survey}")
+        console.say(f"measure it again   {shlex.join(again)}")
 
 
 def _say_measured(analysis: dict[str, Any]) -> None:

@@ -4,14 +4,14 @@ import { chooseLanguage, languageInUse, t } from "../i18n/i18n.js";
 import { $, make } from "../shared/dom.js";
 import { clearSnacks } from "../shared/snacks.js";
 import { load, save } from "../shared/store.js";
-import { accept, BY_HAND, nudge, refineTarget, remove, setSigma, setState, stepCamera, stepThing, target, toggleGuess } from "./marking.js";
+import { accept, BY_HAND, nudge, remove, setSigma, setState, stepCamera, stepThing, target, toggleGuess } from "./marking.js";
 import { centre, moveCrosshair, pan, placeAtCrosshair, showWhole, zoomIn, zoomOut } from "./panes.js";
 import { spreadTone } from "./picture.js";
 import { stepPulse, toEnd, toGap, togglePlay, toNext, toOpen, toWorst } from "./pulses.js";
 import { takeBack } from "./session.js";
 import { change, state } from "./state.js";
 import { toggleTape } from "./tape.js";
-import { follow, toEndOfRun } from "./tracking.js";
+import { follow, refineHere, toEndOfRun } from "./tracking.js";
 
 /** A nudge, and one with the Shift key, px of the image. */
 const [NUDGE, LARGE_NUDGE] = [0.1, 1];
@@ -32,7 +32,7 @@ const KEYS = [
   { keys: ["q", "w"], words: "digitize.key_step", action: either("w", (sign, event) => stepPulse(sign * (event.shiftKey ? 10 : 1))) },
   { keys: ["a", "s"], words: "digitize.key_thing", action: either("s", stepThing) },
   { keys: ["d"], words: "digitize.key_camera", action: (event) => stepCamera(event.shiftKey ? -1 : 1) },
-  { keys: ["e"], words: "digitize.key_refine", action: () => void refineTarget() },
+  { keys: ["e"], words: "digitize.key_refine", action: () => void refineHere() },
   { keys: ["r"], words: "digitize.key_accept", action: (event) => void accept(event.shiftKey) },
   { keys: ["z"], words: "digitize.key_undo", action: (event) => void takeBack(event.shiftKey ? "redo" : "undo") },
   { keys: ["x", "delete"], words: "digitize.key_remove", action: remove },

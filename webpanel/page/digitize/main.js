@@ -8,7 +8,7 @@ import { update } from "../shared/store.js";
 import { startFiles } from "./files.js";
 import { startGeometry } from "./geometry.js";
 import { startKeys } from "./keys.js";
-import { accept, refineTarget } from "./marking.js";
+import { accept } from "./marking.js";
 import { startNumbers } from "./numbers.js";
 import { startOperator } from "./operator.js";
 import { startOrientation } from "./orientation.js";
@@ -21,7 +21,7 @@ import { takeBack } from "./session.js";
 import { cameras, change, redraw, state, watch } from "./state.js";
 import { startTape } from "./tape.js";
 import { startThings } from "./things.js";
-import { startTracking } from "./tracking.js";
+import { refineHere, startTracking } from "./tracking.js";
 
 startLanguage();
 startLogin(() => location.reload());
@@ -56,7 +56,7 @@ async function open() {
   startKeys(() => { drawSpeeds(); drawResult(); redraw(); });
   $("undo").addEventListener("click", () => void takeBack("undo"));
   $("redo").addEventListener("click", () => void takeBack("redo"));
-  $("act-refine").addEventListener("click", () => void refineTarget());
+  $("act-refine").addEventListener("click", () => void refineHere());
   $("act-accept").addEventListener("click", () => void accept(false));
   $("act-accept-all").addEventListener("click", () => void accept(true));
   watch(drawHead);

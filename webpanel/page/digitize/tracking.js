@@ -4,10 +4,10 @@ import { t } from "../i18n/i18n.js";
 import { $, make } from "../shared/dom.js";
 import { attempt, tell } from "../shared/snacks.js";
 import { said } from "./advance.js";
-import { select } from "./marking.js";
+import { refineTarget, select, target } from "./marking.js";
 import { track } from "./server.js";
 import { reloadAll } from "./session.js";
-import { cameras, change, indexOf, listed, state, watch } from "./state.js";
+import { cameras, change, indexOf, listed, state, thingOf, watch } from "./state.js";
 import { titleOf } from "./things.js";
 
 /** Which way was tracked last: the end of the run is searched in it. @type {1|-1} */
@@ -41,6 +41,23 @@ export async function follow(way) {
   $("track-said").replaceChildren(...things.map((thing) => make("li", {}, t("digitize.tracked", {
     thing: titleOf(thing), count: String(found.tracked[thing]?.length ?? 0), why: found.stopped[thing] ?? t("digitize.track_whole"),
   }))));
+}
+
+/**
+ * Find the mark on which keys act more exactly: a ski as a whole, in all images of oriented cameras at once; anything
+ * else in its own image.
+ */
+export async function refineHere() {
+  const thing = target()?.thing;
+  const asOne = thing && thingOf(thing)?.kind === "line" && state.opening?.cameras.some((camera) => camera.oriented);
+  if (!asOne) return refineTarget();
+  if (state.busy || !state.operator) return;
+  change({ busy: "digitize.tracking" });
+  const found = await attempt(() => track(state.operator, { things: [thing], pulse: state.pulse, direction: 1, most: 0 }));
+  change({ busy: "" });
+  if (!found) return;
+  await reloadAll();
+  if (!found.tracked[thing]?.length) tell("info", found.stopped[thing] ?? t("digitize.track_nothing"));
 }
 
 /** Go to the last pulse to which the selected thing was followed without a gap. */

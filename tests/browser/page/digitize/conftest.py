@@ -63,9 +63,19 @@ class Desk:
 
     def true(self, camera: str, thing: str, pulse: int = PULSE) -> Floats:
         """Where a point of the jumper really is in an image, px."""
+        return self.image(camera, np.array(self.log.truth[pulse]["points"][thing]))
+
+    def image(self, camera: str, point: Floats) -> Floats:
+        """Where a point in space is in an image, px."""
         scenario = training()
         projection = scenario.cameras[scenario.camera_index(camera)].projection(*SIZE)
-        return np.asarray(projection.pixels(np.array(self.log.truth[pulse]["points"][thing])))
+        return np.asarray(projection.pixels(point))
+
+    def place(self, camera: str, thing: str, place: Floats) -> None:
+        """Mark a thing in an image, as another page would."""
+        action = {"do": "place", "pulse": PULSE, "camera": camera, "thing": thing, "xy": place.tolist()}
+        answer = self.client.post(f"/sessions/{OPERATOR}/actions", json=action)
+        assert answer.status_code == 200, answer.text
 
 
 @pytest.fixture(scope="module")

@@ -196,3 +196,23 @@ def test_a_click_is_refined_and_followed_through_the_images(desk: Desk, open_pag
     page.keyboard.press("z")
     expect(_thing(page, "P1").locator(".sign").first).to_have_attribute("data-letter", "")
     assert set(desk.session()["coverage"]["P1"]["K1"]) == {str(PULSE)}, "one step takes the whole run back"
+
+
+def test_a_ski_is_found_more_exactly_in_all_images_at_once(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=1700, height=900)
+    placed = 0
+    for side in ("right", "left"):
+        ski = desk.log.truth[PULSE]["skis"][side]
+        ends = [np.array(ski["point"]) + s * np.array(ski["direction"]) for s in (-0.9, 0.8)]
+        for camera in ("K1", "K2", "K3"):
+            for place in (desk.image(camera, end) for end in ends):
+                desk.place(camera, f"{side} ski", place)
+                placed += 1
+    desk.wait_for(placed)
+    _thing(page, "right ski").click()
+    page.keyboard.press("e")
+    desk.wait_for(placed + 1)
+    expect(_thing(page, "right ski").locator('.sign[data-letter="r"]')).to_have_count(3)
+    ski = desk.log.truth[PULSE]["skis"]["right"]
+    slope = desk.view()["lines"]["right ski"]["slope"]
+    assert abs(slope["value"] - np.degrees(np.arcsin(ski["direction"][2]))) < 5 * slope["sigma"]

@@ -68,7 +68,7 @@ def test_pictures_become_a_calibration_that_orient_and_the_rig_take(
 
 
 def test_pictures_of_any_format_and_depth_give_the_same(tmp_path: Path, frame: list[NDArray[np.uint8]]) -> None:
-    results = []
+    results: list[float] = []
     for ending, levels in ((".png", 1), (".tif", 257), (".bmp", 1)):
         pictures = [picture.astype(np.uint16) * levels if levels > 1 else picture for picture in frame[:4]]
         folder = _written(tmp_path / ending[1:] / "K1", pictures, ending)  # type: ignore[arg-type]

@@ -232,8 +232,8 @@ def test_error_free_reference_points() -> None:
 
 def test_what_cannot_be_done_is_said() -> None:
     network = hill(1).network
-    with pytest.raises(BadInputError, match=r'no tie point is called "H\*"'):
-        orient(network, alternative=1)
+    with pytest.raises(BadInputError, match=r'no tie point is called "M\*"'):
+        orient(network, alternative=1, moving="M*")
     held = replace(network, images=(replace(network.images[0], estimate=False), *network.images[1:]))
     with pytest.raises(BadInputError, match=r"images\.hill-1: the pose is constant"):
         orient(held)

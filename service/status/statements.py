@@ -18,8 +18,7 @@ from rig.settings.camera import CameraSettings
 from rig.transport.recorder_reports import CameraNews
 from service.processes.rig_processes import CameraPresence
 
-_AGAIN: Final = "it is connected again by itself"
-_CAMERA_ADVICE: Final = f"check its power and cable; {_AGAIN}"
+_CAMERA_ADVICE: Final = "check its power and cable; it is connected again by itself"
 _FASTER: Final = (
     "close other programs on it; if that is not enough, lower trigger.rate_hz or make the cameras' regions smaller"
 )
@@ -89,8 +88,8 @@ def _absent(camera: str, said: Phrase, values: dict[str, Value]) -> Statement:
     if not said.text:
         what = f"{camera} is absent"
         return Statement(level=Level.ERROR, code="camera_absent", text=what, advice=_CAMERA_ADVICE, values=values)
-    what = f"{camera} is absent: {said}"  # which says what to do
-    return Statement(level=Level.ERROR, code="camera_absent_why", text=what, advice=_AGAIN, values=values)
+    what = f"{camera} is absent: {said}"
+    return Statement(level=Level.ERROR, code="camera_absent_why", text=what, advice=_CAMERA_ADVICE, values=values)
 
 
 def about_state(

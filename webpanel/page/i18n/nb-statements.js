@@ -53,7 +53,7 @@ export const statements = {
   camera_silent: ["{camera} sender ingen bilder mens de andre gjør det", "sjekk triggerkabelen; kameraet kobles til på nytt av seg selv"],
   camera_overloaded: ["bildene fra {camera} kommer for sent: denne datamaskinen er for treg for kameraene", "lukk andre programmer på den; er det ikke nok, senk trigger.rate_hz eller gjør kameraenes utsnitt mindre"],
   camera_absent: ["{camera} er ikke der", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
-  camera_absent_why: ["{camera} er ikke der: {reason}", "kameraet kobles til på nytt av seg selv"],
+  camera_absent_why: ["{camera} er ikke der: {reason}", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
 
   balls_no_file: ["hvor ballene skal være, er ikke kjent: riggfilen nevner ingen innmåling av dem", "skriv den inn, survey = \"hill.json\" under [analysis]; før den finnes, skriv inn planen, plan = \"hill.toml\""],
   balls_not_oriented: ["{camera} er ikke orientert ennå, så hvor det viser ballene, er ikke kjent", "gjør ett opptak på fem sekunder med ballene i sikte; eller gi kameraets omtrentlige plass i innmålingen, eller planen i riggfilen, plan = \"hill.toml\""],

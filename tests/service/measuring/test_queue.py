@@ -242,6 +242,7 @@ def test_a_queue_that_cannot_be_read_is_said(bench: Bench) -> None:
     assert bench.said[0].startswith(f"{NAME}: cannot be read, so logs that waited to be measured are forgotten")
 
 
+@pytest.mark.timeout(600)  # the program that measures takes what others leave of the processors
 @pytest.mark.long
 def test_after_the_measuring_come_a_video_and_a_copy_on_another_disk(bench: Bench, tmp_path: Path) -> None:
     other = tmp_path / "other disk"

@@ -1,4 +1,4 @@
-"""Follows what a person marked through the pulses: points by their appearance, skis by their edges.
+"""Follows what a person marked through the pulses: points by their appearance, skis as bars in space.
 
 What was found is kept as tracked marks by one action; what was only predicted is not kept. Marks by hand on the way
 stay as they are.
@@ -18,9 +18,7 @@ from analysis.digitizing.tracking.motion import KnownMotion
 from analysis.digitizing.tracking.refining import refine_disc, refine_edge
 from analysis.digitizing.tracking.tracker import Tracker
 from analysis.digitizing.tracking.tracks import Automatic, Mark
-from analysis.measurements.model import (
-    PointMeasurement,
-)
+from analysis.measurements.model import PointMeasurement
 from rig.api.digitizing import MarkSource, MarkState, Refined, RefineOrder, Tracked, TrackOrder
 from rig.errors import BadInputError
 

@@ -16,7 +16,7 @@ from math import log
 import numpy as np
 
 from analysis.scene.lit_sphere import LIGHT, UNKNOWNS, Light, sphere_images
-from analysis.scene.lit_windows import SightedBalls, Windows, windows
+from analysis.scene.lit_windows import FULL, SightedBalls, Windows, windows
 from analysis.scene.static_image import StaticImage
 from rig.arrays import Floats, Integers
 
@@ -44,23 +44,13 @@ class LitBalls:
         xy: (n, 2) centres, px.
         covariance: (n, 2, 2) px^2.
         explained: (n,) share of the variance around the background that the ball explains.
-        model_error: (n,) k, standard deviation of the model's error over the contrast.
-        light: (5,) A, H, S; grey values.
-        blur: per camera, px.
-        gain: per camera.
         radius: of the balls, metres.
-        radius_sigma: of the log of the radius; 0 where it was given.
     """
 
     xy: Floats
     covariance: Floats
     explained: Floats
-    model_error: Floats
-    light: Floats
-    blur: Floats
-    gain: Floats
     radius: float
-    radius_sigma: float
 
 
 @dataclass(slots=True, eq=False)
@@ -149,12 +139,12 @@ class _Fit:
         """Model minus image (m, p), derivatives (m, 10, p), variances (m, p), infinite where a pixel does not count."""
         value, design, _ = sphere_images(group.spheres, self._at(state, group.index), clipped=clipped)
         design[:, 2 : 2 + LIGHT] *= self._unit
-        full = group.saturated & (value >= 255 - 1)
+        full = group.saturated & (value >= FULL - 1)
         variance = group.variance + _ROUNDING + (self._model * self._contrast)[group.index, None, None] ** 2
         variance = np.where(group.used & ~full, variance, np.inf)
         m = len(group.index)
         return (
-            np.minimum(value, 255.0).reshape(m, -1) - group.grey.reshape(m, -1),
+            np.minimum(value, FULL).reshape(m, -1) - group.grey.reshape(m, -1),
             design.reshape(m, UNKNOWNS, -1),
             variance.reshape(m, -1),
         )
@@ -249,7 +239,7 @@ class _Fit:
 
     def result(self) -> LitBalls:
         """The measured balls."""
-        n, cameras = len(self._balls), len(self._static)
+        n = len(self._balls)
         _, normal, right = self._equations(self.state, True)
         self._step(normal, right, 0.0)
         of_common = np.linalg.inv(self._cofactors)
@@ -271,12 +261,7 @@ class _Fit:
             self.state.xy,
             own + shared,
             explained,
-            self._model,
-            self._unit * self.state.common[:LIGHT],
-            np.exp(self.state.common[LIGHT + cameras : LIGHT + 2 * cameras]),
-            np.exp(self.state.common[LIGHT : LIGHT + cameras]),
             float(np.exp(self.state.common[-1])),
-            0.0 if self._known else float(np.sqrt(of_common[-1, -1])),
         )
 
     def _sandwich(self, group: Windows, design: Floats, variance: Floats, inverse: Floats) -> Floats:

@@ -16,7 +16,7 @@ _CLEAR = 1.4  # px beyond a ball from which on its surroundings are its backgrou
 _AROUND = 2  # px beyond the window that tell the background too
 _BACKGROUND_BLUR = 1.2  # px; the background is a mean with these weights
 _SIMILAR = 1.3  # ratio of the sizes of windows that are computed together
-_FULL = 255.0
+FULL = 255.0  #: grey value of a pixel that is full
 _STEP_M = 0.02
 
 
@@ -91,7 +91,7 @@ class Windows:
     @property
     def saturated(self) -> Flags:
         """(m, w, w) pixels at full scale."""
-        return np.asarray(self.grey >= _FULL - 1)
+        return np.asarray(self.grey >= FULL - 1)
 
 
 def windows(

@@ -18,7 +18,6 @@ from analysis.ski_bars.pixels import SkiView
 from rig.arrays import Floats
 
 REDUNDANCY: Final = 3  #: what an image says of a ski: shift across, px, turn, rad, and shift along, px
-_OWN: Final = REDUNDANCY
 _S: Final = np.linspace(-1.1, 1.1, 12)  # m, where the axis is projected
 _WIDE_PX, _WIDE_RAD = 3.0, 0.2  # of the step of an image by itself: it begins at the common fit
 _BESIDE_PX = 1.5  # beside a ski, whose pixels it has to explain
@@ -55,16 +54,17 @@ def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
     seen = model.predicted(fit.pixels, x)
     fitted = fit.fitted(x, seen)
     off = fit.pixels.grey - seen.grey
-    weight = fit.weights(x, seen, fitted, m)
+    weight, robust = fit.weights(x, seen, fitted, m), fit.robust(x, seen, m)
+    poses = model.poses(x)
     lines: list[list[ImageLine | None]] = []
     for c, view in enumerate(model.views):
-        rows = np.zeros((len(off), SKIS * _OWN))
+        rows = np.zeros((len(off), SKIS * REDUNDANCY))
         here = fitted & (fit.pixels.camera == c)
         for k in range(SKIS):
             t = np.where(np.isfinite(seen.t[:, k]), seen.t[:, k], 0.0)
-            rows[:, _OWN * k] = -seen.by_u[:, k]
-            rows[:, _OWN * k + 1] = -seen.by_u[:, k] * t
-            rows[:, _OWN * k + 2] = -seen.by_t[:, k]
+            rows[:, REDUNDANCY * k] = -seen.by_u[:, k]
+            rows[:, REDUNDANCY * k + 1] = -seen.by_u[:, k] * t
+            rows[:, REDUNDANCY * k + 2] = -seen.by_t[:, k]
         of_image = np.concatenate(([at.blur[c]], at.width[c], at.brightness[c]))
         rows = np.where(here[:, None], np.column_stack((rows, seen.by_unknowns[:, of_image])), 0.0)
         prior = np.zeros((rows.shape[1],) * 2)
@@ -79,15 +79,15 @@ def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
         for k in range(SKIS):
             near = here & (np.abs(seen.u[:, k]) < seen.half[:, k] + _BESIDE_PX)
             near &= (seen.cover[:, k] > _COVERED) & (seen.s[:, k] < SHOVEL_M)
-            if not fit.used[c, k] or near.sum() < 2 * _OWN:
+            if not fit.used[c, k] or near.sum() < 2 * REDUNDANCY:
                 of.append(None)
                 continue
-            mine = slice(_OWN * k, _OWN * (k + 1))
-            believed = fit.robust(x, seen, m)[near]
+            mine = slice(REDUNDANCY * k, REDUNDANCY * (k + 1))
+            believed = robust[near]
             without = float((believed * (fit.pixels.grey - fit.pixels.behind)[near] ** 2).sum())
             explained = 1 - float((believed * off[near] ** 2).sum()) / max(without, 1e-9)
             visible = float(np.sqrt(believed).mean())
-            of.append(_line(view, model.poses(x), k, step[mine], covariance[mine, mine], (explained, visible)))
+            of.append(_line(view, poses, k, step[mine], covariance[mine, mine], (explained, visible)))
         lines.append(of)
     return lines
 

@@ -28,6 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     asked = _parser().parse_args(arguments)
     halves = list(Half) if asked.half == "both" else [Half(asked.half)]
     cache = None if asked.fresh else asked.cache / _digest(asked.pixels)
+    drawn = {"first": asked.first, "scenes": asked.scenes, "pixels": asked.pixels}
     for half in halves:
         numbers = range(asked.first, asked.first + asked.scenes)
         rows = []
@@ -36,10 +37,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             done = f"{len(rows)} of {asked.scenes}"
             print(f"{half}: {done}" if half is Half.HELD_OUT else f"{half}: {done}: {said(row)}", flush=True)
         name = f"corpus-{half}"
-        before = _before(asked.results / f"{name}.json", asked.first, asked.scenes)
+        before = _before(asked.results / f"{name}.json", drawn)
         print(*table(rows, before), sep="\n")
         groups = {group: msgspec.to_builtins(summed([*filter(of, rows)])) for group, of in GROUPS.items()}
-        print(write_results(name, [{"first": asked.first, "scenes": asked.scenes, "groups": groups}], asked.results))
+        print(write_results(name, [{**drawn, "groups": groups}], asked.results))
 
 
 def measured(half: Half, numbers: range, pixels_most: int, workers: int, cache: Path | None) -> Iterator[Row]:
@@ -96,13 +97,13 @@ def _digest(pixels_most: int) -> str:
     return digest.hexdigest()
 
 
-def _before(path: Path, first: int, scenes: int) -> dict[str, Any] | None:
+def _before(path: Path, drawn: dict[str, int]) -> dict[str, Any] | None:
     """The groups of the run before, if it measured the same scenes."""
     if not path.exists():
         return None
     (case,) = msgspec.json.decode(path.read_bytes())["cases"]
-    groups: dict[str, Any] = case["groups"]
-    return groups if (case["first"], case["scenes"]) == (first, scenes) else None
+    groups: dict[str, Any] = case.pop("groups")
+    return groups if case == drawn else None
 
 
 def _parser() -> argparse.ArgumentParser:

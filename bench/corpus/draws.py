@@ -294,8 +294,7 @@ def _measurable(scenario: Scenario, cameras: list[Projection]) -> bool:
 
 def _angle_deg(a: Floats, b: Floats) -> float:
     """Angle between two lines of sight, at most 90 degrees: a line through both cameras measures nothing."""
-    angle = math.degrees(math.acos(min(1.0, abs(float(a @ b)))))
-    return min(angle, 180 - angle)
+    return math.degrees(math.acos(min(1.0, abs(float(a @ b)))))
 
 
 def _one_of(rng: np.random.Generator, shares: dict[_T, float]) -> _T:

@@ -16,6 +16,7 @@ from bench.analysis.hill_logs import HillLog
 from bench.analysis.judge import Judged
 from bench.corpus.draws import Scene
 from bench.corpus.scenes import render
+from photogrammetry.jumper.stick_model import slope_and_heading
 from rig.arrays import Floats
 from rig.errors import SvevError
 
@@ -176,9 +177,7 @@ def _square(point: PointState, true: Floats) -> float:
 
 def _ski_square(ski: SkiState, direction: Floats) -> float:
     """Square of the error over sigma of slope and heading, chi-squared of two."""
-    slope = np.arctan2(direction[2], np.hypot(direction[0], direction[1]))
-    heading = np.arctan2(direction[1], direction[0])
-    off = np.array((np.radians(ski.slope.value) - slope, np.radians(ski.heading.value) - heading))
+    off = np.radians((ski.slope.value, ski.heading.value)) - slope_and_heading(direction)
     return float(off @ np.linalg.solve(ski.covariance, off))
 
 

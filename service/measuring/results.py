@@ -3,12 +3,12 @@
 import json
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 from pydantic import Field, ValidationError
 
@@ -132,13 +132,25 @@ def result_downloads(log: Path, name: str) -> list[Download]:
     """
     folder, renaming = measured_path(log), is_outdated(log)
     files = [each for each in _files(folder) if not (renaming and bears_names(each.name))]
-    return [_download(path, f"{measured_path(Path(name)).name}/{path.name}") for path in (*files, *_own(folder))]
+    return [file_download(path, f"{measured_path(Path(name)).name}/{path.name}") for path in (*files, *_own(folder))]
 
 
-def _download(path: Path, name: str) -> Download:
-    stat, opened = path.stat(), partial(open_to_read, path, links=False)
+def _opened(path: Path, _size: int) -> BinaryIO:
+    return open_to_read(path, links=False)
+
+
+def file_download(path: Path, name: str, opened: Callable[[Path, int], BinaryIO] = _opened) -> Download:
+    """A file to take away as it stands.
+
+    Args:
+        path: the file.
+        name: that it is taken away as.
+        opened: opens it to be read up to the size that it has now.
+    """
+    stat = path.stat()
     tag = f"{stat.st_ino}-{stat.st_mtime_ns}-{stat.st_size}"
-    return Download(name, stat.st_size, stat.st_mtime, tag, corrected=False, open=opened)
+    opening = partial(opened, path, stat.st_size)
+    return Download(name, stat.st_size, stat.st_mtime, tag, corrected=False, open=opening)
 
 
 def _own(folder: Path) -> list[Path]:

@@ -1,12 +1,12 @@
 """What people measured in a log by hand, to take away with it."""
 
 import io
-from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
 from recorder.log.digitized_path import digitized_path
 from rig.host.files import open_to_read
+from service.measuring.results import file_download
 from service.seam.archive import Download
 
 
@@ -21,13 +21,7 @@ def digitized_downloads(log: Path, name: str) -> list[Download]:
     within = digitized_path(Path(name)).name
     files = [path for path in sorted(folder.rglob("*")) if path.is_file() and not path.is_symlink()]
     seen = [path for path in files if not any(part.startswith(".") for part in path.relative_to(folder).parts)]
-    return [_download(path, f"{within}/{path.relative_to(folder)}") for path in seen]
-
-
-def _download(path: Path, name: str) -> Download:
-    stat = path.stat()
-    tag = f"{stat.st_ino}-{stat.st_mtime_ns}-{stat.st_size}"
-    return Download(name, stat.st_size, stat.st_mtime, tag, corrected=False, open=partial(_begin, path, stat.st_size))
+    return [file_download(path, f"{within}/{path.relative_to(folder)}", _begin) for path in seen]
 
 
 def _begin(path: Path, size: int) -> BinaryIO:

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 UNITS: Final = 24  # raster cells along a square: its marker begins after 5 of them, and each field has 2
 _DARK, _BRIGHT, _BEHIND = 30.0, 210.0, 120.0
 _FINE: Final = 4  # rays along a pixel's side
+_STRIP: Final = 16  # rows of the fine grid that are computed at a time: their arrays stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,12 @@ class DrawnCamera:
         fine = [(np.arange(n * _FINE) + 0.5) / _FINE - 0.5 for n in (width, height)]
         ideal_x, ideal_y = (RectBivariateSpline(coarse_y, coarse_x, each)(fine[1], fine[0]) for each in (x, y))
         return ideal_x, ideal_y
+
+    @cached_property
+    def extents(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Least and greatest ideal x of each column of the fine grid, and y of each row."""
+        x, y = self.rays
+        return (x.min(axis=0), x.max(axis=0)), (y.min(axis=1), y.max(axis=1))
 
 
 @dataclass(frozen=True)
@@ -113,20 +120,20 @@ class Drawing:
 
     def picture(self, sheets: list[Sheet], position: Array, rotation: Array) -> NDArray[np.uint8]:
         """(rows, columns) what the camera sees."""
-        x, y = self.camera.rays
-        fine = np.full(x.shape, _BEHIND, np.float32)
-        nearest = np.full(x.shape, np.inf, np.float32)
+        shape = self.camera.rays[0].shape
+        fine = np.full(shape, _BEHIND, np.float32)
+        nearest = np.full(shape, np.inf, np.float32)
         for sheet in sheets:
-            _draw(sheet, (x, y), self.camera, position, rotation, fine, nearest)
+            _draw(sheet, self.camera, position, rotation, fine, nearest)
         blurred = cv2.GaussianBlur(fine, (0, 0), self.blur * _FINE) if self.blur else fine
         width, height = self.camera.size
-        grey = blurred.reshape(height, _FINE, width, _FINE).mean(axis=(1, 3))
+        grey = cv2.resize(blurred, (width, height), interpolation=cv2.INTER_AREA)
         noisy = grey + self.random.normal(0.0, self.noise, grey.shape)
         return np.asarray(np.clip(np.rint(noisy), 0, 255), np.uint8)
 
 
 def _draw(
-    sheet: Sheet, rays: tuple[Array, Array], camera: DrawnCamera, position: Array, rotation: Array,
+    sheet: Sheet, camera: DrawnCamera, position: Array, rotation: Array,
     fine: NDArray[np.float32], nearest: NDArray[np.float32],
 ) -> None:  # fmt: skip
     right, above, towards = sheet.axes.T
@@ -139,35 +146,52 @@ def _draw(
     if np.any(k[:, 2] > -1.0):
         raise ValueError("a sheet reaches behind the camera")
     ideal = -camera.c * k[:, :2] / k[:, 2:]
-    column = np.flatnonzero((rays[0].min(axis=0) < ideal[:, 0].max()) & (rays[0].max(axis=0) > ideal[:, 0].min()))
-    row = np.flatnonzero((rays[1].min(axis=1) < ideal[:, 1].max()) & (rays[1].max(axis=1) > ideal[:, 1].min()))
+    column, row = (
+        np.flatnonzero((least < places.max()) & (most > places.min()))
+        for (least, most), places in zip(camera.extents, ideal.T, strict=True)
+    )
     if min(len(row), len(column)) < 2:
         return
-    window = np.s_[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
-    x, y = rays[0][window], rays[1][window]
     # direction (x, y, -c) in the camera system
     into = [rotation.T @ axis for axis in (right, above, towards)]
-    scale = (towards @ (sheet.place - position)) / (into[2][0] * x + into[2][1] * y - into[2][2] * camera.c)
     start = position - sheet.place
-    u = right @ start + scale * (into[0][0] * x + into[0][1] * y - into[0][2] * camera.c)
-    v = above @ start + scale * (into[1][0] * x + into[1][1] * y - into[1][2] * camera.c)
-    across, down = (u + half[0]) / sheet.cell, (half[1] - v) / sheet.cell
-    inside = (down >= 0) & (down < rows) & (across >= 0) & (across < columns) & (scale > 0) & (scale < nearest[window])
-    fine[window] = np.where(inside, _mean_shade(sheet.raster, across, down), fine[window])
-    nearest[window] = np.where(inside, scale, nearest[window])
+    end = int(row[-1]) + 1
+    for top in range(int(row[0]), end, _STRIP):
+        bottom = min(top + _STRIP, end)
+        first, last = max(top - 1, int(row[0])), min(bottom + 1, end)  # the slope of a row needs its neighbours
+        wide = np.s_[first:last, column[0] : column[-1] + 1]
+        x, y = camera.rays[0][wide], camera.rays[1][wide]
+        scale = (towards @ (sheet.place - position)) / (into[2][0] * x + into[2][1] * y - into[2][2] * camera.c)
+        u = right @ start + scale * (into[0][0] * x + into[0][1] * y - into[0][2] * camera.c)
+        v = above @ start + scale * (into[1][0] * x + into[1][1] * y - into[1][2] * camera.c)
+        across, down = (u + half[0]) / sheet.cell, (half[1] - v) / sheet.cell
+        within = (
+            (down >= 0) & (down < rows) & (across >= 0) & (across < columns) & (scale > 0) & (scale < nearest[wide])
+        )
+        within[: top - first] = within[bottom - first :] = False
+        fine[wide][within] = _mean_shade(sheet.raster, across, down, within)
+        nearest[wide][within] = scale[within]
 
 
-def _mean_shade(raster: NDArray[np.float32], across: Array, down: Array) -> Array:
-    """The mean of the raster over the footprint of each ray, which is smaller than a cell; places in cells."""
-    shares, first = [], []
-    for places, most in ((down, raster.shape[0] - 1), (across, raster.shape[1] - 1)):
-        footprint = np.hypot(*np.gradient(places))
-        begin = np.floor(places - 0.5)
-        shares.append(np.clip((places - 0.5 - begin - 0.5) / footprint + 0.5, 0.0, 1.0))
-        first.append([np.clip(begin.astype(np.intp) + step, 0, most) for step in (0, 1)])
-    (s, t), (i, j) = shares, first
-    upper = (1 - t) * raster[i[0], j[0]] + t * raster[i[0], j[1]]
-    lower = (1 - t) * raster[i[1], j[0]] + t * raster[i[1], j[1]]
+def _mean_shade(raster: NDArray[np.float32], across: Array, down: Array, wanted: NDArray[np.bool_]) -> Array:
+    """The mean of the raster over the footprint of each ray that is wanted, in their order; places in cells.
+
+    A footprint is smaller than a cell.
+    """
+    padded = np.pad(raster, 1, mode="edge")
+    columns = padded.shape[1]
+    shares, cells = [], np.full(np.count_nonzero(wanted), columns + 1, np.intp)
+    for places, step in ((down, columns), (across, 1)):
+        along, over = np.gradient(places)
+        footprint = np.sqrt(along * along + over * over)[wanted]
+        seen = places[wanted]
+        begin = np.floor(seen - 0.5)
+        shares.append(np.clip((seen - 0.5 - begin - 0.5) / footprint + 0.5, 0.0, 1.0))
+        cells += begin.astype(np.intp) * step
+    s, t = shares
+    shades = padded.ravel()
+    upper = (1 - t) * shades[cells] + t * shades[cells + 1]
+    lower = (1 - t) * shades[cells + columns] + t * shades[cells + columns + 1]
     return np.asarray((1 - s) * upper + s * lower)
 
 

@@ -8,12 +8,8 @@ from types import TracebackType
 from typing import BinaryIO, Self
 
 from rig.transport.launcher import Process, launcher, start_program
+from svev.cli import _COMMANDS
 
-#: Imported once by the launcher; a command that is not among them imports what it needs, as ever.
-_PREPARED = (
-    "svev.commands.rig.record", "svev.commands.rig.serve", "svev.commands.rig.ctl", "svev.commands.rig.rehearse",
-    "svev.commands.logs.contents", "svev.commands.logs.replay",
-)  # fmt: skip
 #: Commands that start programs.
 _LAUNCHING = ("record", "serve", "rehearse", "demo", "bench")
 _ENDS_S = 10.0
@@ -94,10 +90,17 @@ def launch_svev(
         output: descriptor of its standard output and error, or those of both.
         environment: variables that it has beside ours.
     """
-    launcher().prepare(*_PREPARED)
-    launches = bool(arguments) and arguments[0] in _LAUNCHING
+    command = arguments[0] if arguments else ""
+    if command in _COMMANDS:
+        launcher().prepare(f"svev.commands.{_COMMANDS[command][0]}")  # once: the next one has it from its birth
     return start_program(
-        "svev.__main__", arguments, (), environment or {}, own_group=False, output=output, launches=launches
+        "svev.__main__",
+        arguments,
+        (),
+        environment or {},
+        own_group=False,
+        output=output,
+        launches=command in _LAUNCHING,
     )
 
 

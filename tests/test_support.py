@@ -147,6 +147,25 @@ def test_hardware_tests_run_only_when_asked_for(tmp_path: Path) -> None:
     assert "1 passed" in _pytest(tmp_path, source, "--hardware")
 
 
+def test_those_that_may_take_longest_begin_first(tmp_path: Path) -> None:
+    source = """
+import pytest
+
+def test_usual(): pass
+
+@pytest.mark.timeout(20)
+def test_short(): pass
+
+@pytest.mark.timeout(400)
+def test_long(): pass
+
+@pytest.mark.timeout(900)
+def test_longest(): pass
+"""
+    collected = _pytest(tmp_path, source, "--collect-only", "-q", "-o", "timeout=180")
+    assert re.findall(r"::(test_\w+)", collected) == ["test_longest", "test_long", "test_usual", "test_short"]
+
+
 def test_two_runs_at_once_get_different_addresses(loopback: Loopback) -> None:
     worker = int(loopback.block.split(".")[1]) - 10
     with loopback_blocks.claim(worker) as other:

@@ -63,10 +63,12 @@ class Ledger:
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
         self._costs: dict[str, float] = {}
+        self._lasted: dict[str, float] = defaultdict(float)
         self._workers_s = 0.0
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Take what a test has cost."""
+        """Take what a test has cost, and how long it has lasted with its fixtures."""
+        self._lasted[report.nodeid] += report.duration
         for name, value in report.user_properties:
             if name == _PROPERTY:
                 self._costs[report.nodeid] = float(str(value))
@@ -95,6 +97,11 @@ class Ledger:
         terminalreporter.write_line("")
         for name, cost in _dearest(self._costs)[:_SHOWN]:
             terminalreporter.write_line(f"{cost:8.1f} s  {name}")
+        terminalreporter.write_line("")
+        terminalreporter.write_line("waited: seconds of the wall clock beyond those")
+        waited = {name: self._lasted[name] - cost for name, cost in self._costs.items()}
+        for name, seconds in [*_dearest(_by_folder(waited)), *_dearest(waited)[:_SHOWN]]:
+            terminalreporter.write_line(f"{seconds:8.1f} s  {name}")
 
 
 def folder_of(nodeid: str) -> str:

@@ -42,7 +42,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Without --hardware the tests that need real cameras are skipped, and say so."""
+    """Those that may take longest begin first; without --hardware those that need real cameras are skipped."""
+    usual_s = float(config.getini("timeout") or 0)
+
+    def most_s(item: pytest.Item) -> float:
+        marker = item.get_closest_marker("timeout")
+        return max(usual_s, *map(float, marker.args)) if marker is not None else usual_s
+
+    # Otherwise one that takes minutes begins last, and the other workers have nothing left to do.
+    items.sort(key=most_s, reverse=True)
     if config.getoption("--hardware"):
         return
     for item in items:

@@ -167,7 +167,7 @@ def test_the_schema_is_a_schema() -> None:
             id="deep arrays",
         ),
         pytest.param(
-            HEAD + "x" + ".x" * 10_000 + " = 1\n" + CAMERA,
+            HEAD + "x" + ".x" * 2_000 + " = 1\n" + CAMERA,
             "not valid TOML: nested too deeply; correct it there",
             id="deep tables",
         ),

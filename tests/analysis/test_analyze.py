@@ -35,6 +35,7 @@ def svev(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[s
     return done
 
 
+@pytest.mark.long
 def test_a_jump_is_measured_and_its_errors_are_within_their_sigmas(
     jump: HillLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -23,6 +23,7 @@ from tests.analysis.digitizing.hill import MEASURED, clicks, opened
 from tests.support.waiting import wait_until
 
 
+@pytest.mark.long
 def test_points_skis_and_angles_that_were_clicked_are_true(desk: Desk, jump: HillLog) -> None:
     for click in clicks(desk, jump, seed=3):
         changed = desk.act("Anna", click.action())

@@ -16,6 +16,7 @@ START = 20
 THINGS = ["P1", "P2", "P3", "P4", "right ski", "left ski"]
 
 
+@pytest.mark.long
 def test_a_start_by_hand_is_carried_through_thirty_pulses(desk: Desk, jump: HillLog) -> None:
     for click in clicks(desk, jump, 11, range(START, START + 1)):
         desk.session("Anna").act(click.action())

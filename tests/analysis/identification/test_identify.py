@@ -19,7 +19,6 @@ from rig.arrays import Floats
 from rig.pulse import PulseNumber
 from tests.analysis.identification.cluttered import Disturbed, Scene, scene
 from tests.analysis.simulated import RATE_HZ, SIGMA_PX, SKI_SIGMA_PX, true_cameras, true_jump
-from tests.support.repeats import repeats
 
 PULSES = range(15, 70)
 #: A spot is the named marker if it lies within 6 sigma of it; spots of others or of nothing do so once in a million.
@@ -231,7 +230,8 @@ def _all_are_true(jump: JumpMeasurements) -> None:
                 assert np.linalg.norm(point.xy - true_cameras()[camera].project(marker)) < NEAR_PX
 
 
-@pytest.mark.parametrize("marker", repeats(["P1", "P4"]))
+@pytest.mark.long
+@pytest.mark.parametrize("marker", ["P1", "P4"])
 def test_what_is_no_disc_like_the_markers_is_none_and_a_marker_in_the_shade_is_one(marker: str) -> None:
     """A face, e.g., where the helmet has no marker, is as faint as one in the shade."""
     lights = dict.fromkeys(POINTS, 80.0) | {marker: 40.0}

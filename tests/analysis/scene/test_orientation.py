@@ -300,7 +300,11 @@ def _same_place(data: dict[str, Any]) -> dict[str, Any]:
             r"camera K1: \d+ round spots found, which do not fit the 15 surveyed balls.*; camera K2: .*K3: ",
             marks=pytest.mark.long,
         ),
-        (_wrong_c, "camera K1: .* do not fit the 15 surveyed balls .*; check survey and interior orientation"),
+        pytest.param(
+            _wrong_c,
+            "camera K1: .* do not fit the 15 surveyed balls .*; check survey and interior orientation",
+            marks=pytest.mark.long,
+        ),
         (_resized, "camera K2 is calibrated for images of 1936 x 1216 px, those of the log have 640 x 480 px; give"),
         (_renamed, r"camera K2 of the log is missing \(there: K1, Cam2, Cam3\); name the cameras as in the log"),
         (_few, "has 3 surveyed balls .* at least 4"),
@@ -340,6 +344,7 @@ def test_a_measured_network_is_no_survey(tmp_path: Path) -> None:
         read_survey(tmp_path / "survey.json")
 
 
+@pytest.mark.long
 def test_a_principal_distance_that_is_a_little_wrong_is_said() -> None:
     data = survey_json(training(), 13)
     data["cameras"]["K1"]["c"] *= 1.01

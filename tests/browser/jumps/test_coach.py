@@ -64,6 +64,7 @@ def _watched(page: Page) -> list[str]:
     return asked
 
 
+@pytest.mark.long
 def test_the_screen_shows_the_last_jump_without_a_hand(hill: Hill, service: MemoryService, open_page: Open) -> None:
     service.arm()
     page = open_page("about:blank", width=1280, height=720)

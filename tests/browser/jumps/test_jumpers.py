@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import httpx
+import pytest
 from playwright.sync_api import Route, expect
 
 from rig.api.recordings import RecordingOrder
@@ -22,6 +23,7 @@ def test_names_of_athletes_are_text_and_nothing_else(panel: Panel, jumps: None, 
     expect(page.locator("#recordings-list li")).to_have_count(1)
 
 
+@pytest.mark.long
 def test_who_jumps_is_taken_at_the_start_and_conditions_carry_over(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:

@@ -2,6 +2,7 @@
 
 from datetime import UTC, datetime
 
+import pytest
 from playwright.sync_api import expect
 
 from rig.api.statement import Level, Statement
@@ -27,6 +28,7 @@ NOTE = """
 """
 
 
+@pytest.mark.long
 def test_started_stopped_and_fault_are_signalled_once_they_are_switched_on(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:

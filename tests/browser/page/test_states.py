@@ -156,6 +156,7 @@ def test_a_second_tap_is_said_beside_the_button_and_a_long_press_stops(
     expect(page.locator("#snacks [data-level=error]")).to_have_count(0)
 
 
+@pytest.mark.long
 def test_a_long_press_stops_at_any_time_wherever_the_button_goes_and_its_end_is_no_tap(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:

@@ -30,6 +30,7 @@ def _curve_height(page: Page, camera: str, at: Floats) -> float:
     return float(np.nonzero(alike.any(axis=1))[0].mean() - 60)
 
 
+@pytest.mark.long
 def test_a_point_in_three_views_with_curves_and_a_mistake(desk: Desk, open_page: Open) -> None:
     page = enter(open_page, desk, width=1700, height=900)
     page.locator("#advance").select_option("view")
@@ -72,6 +73,7 @@ def test_a_point_in_three_views_with_curves_and_a_mistake(desk: Desk, open_page:
     expect(page.locator("#tape-says")).to_contain_text(re.compile(rf"Length {length:.1f}"))
 
 
+@pytest.mark.long
 def test_a_jump_measured_with_keys_alone(desk: Desk, open_page: Open) -> None:
     page = enter(open_page, desk, width=1280, height=900, reduced_motion="reduce")
     page.keyboard.press("Enter")  # the crosshair is in the middle
@@ -160,6 +162,7 @@ def test_a_finger_places_where_the_loupe_shows_and_two_fingers_enlarge(desk: Des
     assert desk.session()["revision"] == 1, "two fingers measure nothing"
 
 
+@pytest.mark.long
 def test_two_browsers_on_one_session_see_each_other(desk: Desk, open_page: Open) -> None:
     first = enter(open_page, desk)
     second = enter(open_page, desk)
@@ -173,6 +176,7 @@ def test_two_browsers_on_one_session_see_each_other(desk: Desk, open_page: Open)
     assert desk.session(OPERATOR)["redo"] == 2
 
 
+@pytest.mark.long
 def test_a_click_is_refined_and_followed_through_the_images(desk: Desk, open_page: Open) -> None:
     page = enter(open_page, desk, width=1700, height=900)
     page.locator("#advance").select_option("view")

@@ -10,6 +10,7 @@ from scipy import ndimage
 from rig.arrays import Floats
 from tests.browser.conftest import Open
 from tests.browser.page.digitize.conftest import PULSE, Desk, canvas_of, decoded, enter, seen, settled
+from tests.support.repeats import repeats
 from tests.support.waiting import wait_until
 
 #: px of the image.
@@ -47,7 +48,7 @@ def _shift(seen: Floats, expected: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(slopes, (second - first).ravel(), rcond=None)[0][:2])
 
 
-@pytest.mark.parametrize("ratio", [1, 2])
+@pytest.mark.parametrize("ratio", repeats([1, 2]))
 def test_a_click_gives_the_place_of_the_image_that_is_seen_there(desk: Desk, open_page: Open, ratio: int) -> None:
     page = enter(open_page, desk, width=1500, height=1000, device_scale_factor=ratio)
     page.locator("#advance").select_option("stay")

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 from playwright.sync_api import expect
 
 from tests.analysis.simulated import SIZE, training
@@ -48,6 +49,7 @@ def test_balls_that_were_clicked_orient_the_cameras(desk: Desk, open_page: Open)
     expect(page.locator("#orient-clicked")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_a_jump_is_computed_goes_out_as_a_file_and_comes_back(desk: Desk, open_page: Open, tmp_path: Path) -> None:
     for pulse in range(6, 15):
         for camera in CAMERAS:

@@ -11,8 +11,8 @@ SHELL := /bin/bash
 # call of pytest, would compile the program anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Tests that run at a time.
-WORKERS ?= 2
+# Tests that run at a time. Many wait for cameras, browsers and clocks: three keep two cores busy.
+WORKERS ?= 3
 
 ARGS ?=
 PREFIX ?= /usr/local

@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -16,6 +15,7 @@ from svev.console import visible
 from svev.serving.systemd import log_line
 from tests.capture.rigs import write_rig
 from tests.service.serving import serving
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 
 #: Clears the screen, sets the title of the window, turns the direction of writing, begins a new line, rings.
@@ -38,8 +38,7 @@ def test_what_a_terminal_would_obey_is_written_out(text: str, shown: str) -> Non
 
 
 def _svev(*arguments: str | bytes) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "svev", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return run_svev(*map(os.fsdecode, arguments))
 
 
 def _is_harmless(*texts: str) -> None:

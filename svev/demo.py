@@ -1,5 +1,6 @@
 """Runs the demonstration on the simulated hill: records, publishes, checks the log, measures the jumps."""
 
+import re
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -7,12 +8,13 @@ from typing import Any, Final, Literal
 
 from analysis.film.contact_sheet import write_contact_sheet
 from recorder.checking.verify import verify
+from recorder.log.survey_path import survey_path
 from recorder.log.truth_path import truth_path
 from recorder.publishing.subscriber import free_address, subscriber
 from rig.errors import BadInputError
 from rig.host.endings import counted_endings
 from rig.settings.file import CONFIG, load_rig
-from rig.settings.model import RigSettings
+from rig.settings.model import RigSettings, SimulationSettings
 from service.headless import HeadlessRig, record
 from service.recordings.storage import new_log_path
 from svev import console
@@ -20,6 +22,7 @@ from svev.claims import folder_claim
 from svev.demo_analysis import measure
 
 Bus = Literal["gige", "firewire", "sim"]
+Shown = Literal["training", "hard", "faults"]
 
 _RIGS: Final[dict[Bus, str]] = {"gige": "sim-gige.toml", "firewire": "sim-firewire.toml", "sim": "sim.toml"}
 _CAMERAS: Final[dict[Bus, str]] = {
@@ -32,12 +35,13 @@ _BLOCKS: Final = 64
 
 
 def run_demo(
-    bus: Bus, seconds: float, out: Path, say: Callable[[str], None], *, analyze: bool = True
+    bus: Bus, shown: Shown, seconds: float, out: Path, say: Callable[[str], None], *, analyze: bool = True
 ) -> dict[str, Any]:
     """Record for `seconds` on the simulated hill, with a subscriber that counts the triplets; measure the jumps.
 
     Args:
         bus: how the simulated cameras are connected.
+        shown: scenario of the simulated hill.
         seconds: length of the recording.
         out: folder for the files.
         say: prints a line for people.
@@ -50,13 +54,13 @@ def run_demo(
     Raises:
         SvevError: as `service.headless.record`, and if images are missing because of the disk.
     """
-    rig_file = CONFIG / "rigs" / _RIGS[bus]
-    rig = _on_free_addresses(load_rig(rig_file))
+    rig, rig_toml = _showing(CONFIG / "rigs" / _RIGS[bus], shown)
+    rig = _on_free_addresses(rig)
     say(f"{_CAMERAS[bus]}; pulses at {rig.trigger.rate_hz:g} Hz")
     with (
         folder_claim(out, "svev demo", "--out"),
         counted_endings() as asks,
-        HeadlessRig(rig, rig_file.read_text(encoding="utf-8"), say) as running,
+        HeadlessRig(rig, rig_toml, say) as running,
     ):
         path = new_log_path(out)
         running.wait_until_warm(asks)
@@ -79,8 +83,16 @@ def run_demo(
         "verdict": report.verdict,
         "contact_sheet": str(sheet),
         "truth": str(truth_path(path)),
-        "analysis": measure(path, rig, say) if analyze else None,
+        "survey": str(survey_path(path)),
+        "analysis": measure(path, say) if analyze else None,
     }
+
+
+def _showing(rig_file: Path, shown: Shown) -> tuple[RigSettings, str]:
+    """A shipped rig and the text of its file, both with that scenario."""
+    text = re.sub(r"scenarios/\w+\.toml", f"scenarios/{shown}.toml", rig_file.read_text(encoding="utf-8"))
+    simulation = SimulationSettings(scenario=CONFIG / "scenarios" / f"{shown}.toml")
+    return load_rig(rig_file).model_copy(update={"simulation": simulation}), text
 
 
 def _on_free_addresses(rig: RigSettings) -> RigSettings:

@@ -11,11 +11,9 @@ from analysis.procedure.analyze import analyze
 from analysis.procedure.result_folder import write_folder
 from analysis.report.figures import EARLY_S, plus_minus
 from analysis.result.model import Jump, PulseState, Quantity, SmoothedState
+from recorder.log.survey_path import survey_path
 from recorder.log.truth_path import truth_path
 from rig.errors import NoJumpError
-from rig.settings.model import RigSettings
-from simrig.world.scenario import load_scenario
-from simrig.world.survey import survey
 from svev import console
 
 #: What is shown: name in the result and in the truth, name for people, unit.
@@ -51,12 +49,11 @@ class Comparison:
         return f"{self.name:28}{plus_minus(self.measured, self.unit):24}true {self.true:.2f}"
 
 
-def measure(log: Path, rig: RigSettings, say: Callable[[str], None]) -> dict[str, Any]:
-    """Write the survey of the simulated hill, measure the jumps, write the results into a folder beside the log.
+def measure(log: Path, say: Callable[[str], None]) -> dict[str, Any]:
+    """Measure the jumps with the survey beside the log, write the results into a folder beside it.
 
     Args:
-        log: of the simulated rig.
-        rig: the rig.
+        log: of a simulated rig.
         say: prints a line for people.
 
     Returns:
@@ -65,16 +62,12 @@ def measure(log: Path, rig: RigSettings, say: Callable[[str], None]) -> dict[str
     Raises:
         SvevError: as `analysis.procedure.analyze.analyze`.
     """
-    if rig.simulation is None:
-        raise ValueError("only the simulated hill has a survey of its own")
-    scenario, region = load_scenario(rig.simulation.scenario), rig.cameras[0].region
-    surveyed, folder = log.with_suffix(".survey.json"), log.with_suffix("")
-    surveyed.write_text(json.dumps(survey(scenario, (region.width, region.height)), indent=1), encoding="utf-8")
+    folder = log.with_suffix("")
     say("measuring the jumper")
-    found: dict[str, Any] = {"survey": str(surveyed), "out": None, "report": None, "jumps": [], "message": ""}
+    found: dict[str, Any] = {"out": None, "report": None, "jumps": [], "message": ""}
     try:
         with console.steps() as tell:
-            analysis = analyze(log, read_source(surveyed, None), progress=tell)
+            analysis = analyze(log, read_source(survey_path(log), None), progress=tell)
             write_folder(analysis, log, folder, progress=tell)
     except NoJumpError as error:
         return found | {"message": str(error)}

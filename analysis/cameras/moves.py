@@ -154,7 +154,7 @@ _WAYS: Final = (
 
 def turn_words(turn: Floats) -> list[Phrase]:
     """The parts of a turn that matter, the largest first: "0.050 deg to the right"."""
-    degrees = np.degrees(turn)
+    degrees = np.degrees(turn).tolist()  # numbers of Python: numpy's have no form in JSON
     order = sorted(range(3), key=lambda i: -abs(degrees[i]))
     named = [i for i in order if abs(degrees[i]) >= _SAID * abs(degrees[order[0]])]
     text = "{degrees:.3f} deg {way}"

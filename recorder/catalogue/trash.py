@@ -15,6 +15,7 @@ from recorder.log.digitized_path import digitized_path
 from recorder.log.jumper_path import jumper_path
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import session_path
+from recorder.log.survey_path import survey_path
 from recorder.log.truth_path import truth_path
 from rig.host.files import opened_folder
 
@@ -107,7 +108,7 @@ def oldest_until(logs: Iterable[TrashedLog], wanted_bytes: float) -> Iterator[Tr
 
 def beside(log: Path) -> tuple[Path, ...]:
     """The files and folders that belong to a log, whether they are there or not."""
-    parts = (session_path, truth_path, jumper_path, measured_path, digitized_path, voice_folder)
+    parts = (session_path, truth_path, survey_path, jumper_path, measured_path, digitized_path, voice_folder)
     return tuple(part(log) for part in parts)
 
 

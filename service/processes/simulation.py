@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 #: Variable in which the simulated hill names the port of its trigger box.
 TRIGGER_PORT: Final = "SVEV_TRIGGER_PORT"
-#: Writes the truth of a recording into a file; called with its path, and number and host time of each pulse.
-WriteTruth = Callable[[Path, Iterable[tuple[PulseNumber, HostNs]]], None]
+#: Writes truth and survey of a recording; called with a path for each, and number and host time of each pulse.
+WriteTruth = Callable[[Path, Path, Iterable[tuple[PulseNumber, HostNs]]], None]
 
 
 def simulated_hill(

@@ -1,4 +1,4 @@
-"""Writes the truth beside the logs of a simulated rig, after they are closed, while the rig goes on."""
+"""Writes truth and survey beside the logs of a simulated rig, after they are closed, while the rig goes on."""
 
 import contextlib
 import os
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from recorder.log.survey_path import survey_path
 from recorder.log.truth_path import truth_path
 from recorder.reading.triplets import tags
 from rig.clocks import HostNs, UtcAnchor
@@ -31,7 +32,7 @@ class _Log:
 
     Attributes:
         path: the log.
-        write: writes its truth.
+        write: writes its truth and its survey.
         anchor: the relation of its UTC times to host time. The recorder took its own when it made the log, some
             milliseconds before: both are the same unless the UTC clock was set in between.
     """
@@ -112,11 +113,12 @@ class TruthWriter:
             self._write(log)
 
     def _write(self, log: _Log) -> None:
-        path = truth_path(log.path)
+        truth, survey = truth_path(log.path), survey_path(log.path)
         try:
-            log.write(path, self._pulses(log))
+            log.write(truth, survey, self._pulses(log))
             if not log.path.exists():  # deleted meanwhile
-                path.unlink(missing_ok=True)
+                truth.unlink(missing_ok=True)
+                survey.unlink(missing_ok=True)
         except (OSError, ValueError, SvevError) as error:
             self._lament(log, str(error))
 

@@ -1,6 +1,8 @@
-"""Writes the truth of a recording of simulated cameras into a file, by the pulse numbers of the recording."""
+"""Writes the truth of a recording of simulated cameras, and the survey of their hill, into files."""
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, Final
 
@@ -15,6 +17,7 @@ from simrig.firewire.camera.geometry import SENSOR, VGA
 from simrig.world.projection import Window
 from simrig.world.pulses import PulseTrain
 from simrig.world.scenario import load_scenario
+from simrig.world.survey import windowed_survey
 from simrig.world.truth import Truth
 
 _VGA_REGION: Final = Region(width=VGA[0], height=VGA[1])
@@ -39,29 +42,28 @@ class RecordingTruth:
         loaded = load_scenario(scenario)
         self._train = PulseTrain(epoch, rig.trigger.rate_hz, loaded.pauses)
         self._truth = Truth(loaded, rig.trigger.rate_hz, windows(rig))
+        self._survey = windowed_survey(loaded, windows(rig))
 
-    def write(self, path: Path, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
-        """Write the file in one go: it is there as a whole or not at all.
+    def write(self, truth: Path, survey: Path, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
+        """Write each file in one go, the survey first: it is there as a whole or not at all.
 
         A pulse at whose time the hill fired none is left out. Pulses are written as they come: the truth of an hour
         would not fit into memory as objects.
 
         Args:
-            path: the file.
+            truth: the file of the truth.
+            survey: the file of the survey, for `svev analyze`.
             pulses: number and host time of each pulse of the recording; what it raises ends the writing.
 
         Raises:
             OSError: the disk refuses.
         """
-        unfinished = unfinished_path(path, ".unfinished")
-        try:
-            with unfinished.open("wb") as file:
-                self._write(file, pulses)
-            unfinished.replace(path)
-        finally:
-            unfinished.unlink(missing_ok=True)
+        with _whole(survey) as file:
+            file.write(json.dumps(self._survey, indent=1).encode() + b"\n")
+        with _whole(truth) as file:
+            self._write_truth(file, pulses)
 
-    def _write(self, file: BinaryIO, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
+    def _write_truth(self, file: BinaryIO, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
         encode = msgspec.json.Encoder().encode
         hill_pulses: dict[str, HillPulse] = {}
         written: set[HillPulse] = set()
@@ -75,6 +77,18 @@ class RecordingTruth:
                 file.write((b",\n" if written else b"\n") + encode(self._truth.state(fired)))
                 written.add(fired)
         file.write(b'],\n"hill_pulse_of_recording":' + encode(hill_pulses) + b"}\n")
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[BinaryIO]:
+    """A file that gets its name when all of it is written."""
+    unfinished = unfinished_path(path, ".unfinished")
+    try:
+        with unfinished.open("wb") as file:
+            yield file
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
 def windows(rig: RigSettings) -> dict[str, Window]:

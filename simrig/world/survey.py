@@ -1,9 +1,11 @@
 """The survey of the simulated hill as a surveyor would hand it over: balls with errors, interior orientations."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from simrig.world.projection import Window
 from simrig.world.scenario import Scenario
 
 SIGMA_M = 0.012  #: of each surveyed coordinate (the paper's estimate)
@@ -19,6 +21,18 @@ def survey(scenario: Scenario, size: tuple[int, int] = (640, 480), sigma: float 
         size: width and height of the images, px.
         sigma: of each coordinate, m.
     """
+    whole = Window(size, 0, 0, *size)
+    return windowed_survey(scenario, {camera.name: whole for camera in scenario.cameras}, sigma)
+
+
+def windowed_survey(scenario: Scenario, windows: Mapping[str, Window], sigma: float = SIGMA_M) -> dict[str, Any]:
+    """As `survey`, for cameras of which a part of the image is recorded.
+
+    Args:
+        scenario: the hill.
+        windows: what is recorded of each camera's images, by name; cameras that are not named do not appear.
+        sigma: of each coordinate, m.
+    """
     rng = np.random.default_rng((scenario.seed, len(scenario.balls)))
     points: dict[str, Any] = {}
     for ball in scenario.balls:
@@ -28,9 +42,16 @@ def survey(scenario: Scenario, size: tuple[int, int] = (640, 480), sigma: float 
             points[ball.name] = {"role": "control", "X": surveyed, "sigma": [sigma] * 3}
     cameras = {}
     for camera in scenario.cameras:
-        projection = camera.projection(*size)
+        if (window := windows.get(camera.name)) is None:
+            continue
+        projection = camera.projection(*window.full).windowed(window)
         lens = {} if projection.lens is None else {name: getattr(projection.lens, name) for name in _PARAMETERS}
-        cameras[camera.name] = {"size": list(size), "c": projection.c, **lens, "distortion": "projected"}
+        cameras[camera.name] = {
+            "size": [window.width, window.height],
+            "c": projection.c,
+            **lens,
+            "distortion": "projected",
+        }
     return {
         "format": "svev-network/1",
         "length_unit": "m",

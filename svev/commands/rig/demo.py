@@ -8,7 +8,7 @@ import typer
 
 from svev import console
 from svev.commands.rig.record import aside, causes
-from svev.demo import Bus, run_demo
+from svev.demo import Bus, Shown, run_demo
 
 
 def demo(
@@ -18,6 +18,9 @@ def demo(
     bus: Annotated[
         Bus, typer.Option(metavar="gige|firewire|sim", help="how the simulated cameras are connected")
     ] = "gige",
+    scenario: Annotated[
+        Shown, typer.Option(metavar="training|hard|faults", help="what the simulated hill shows: a good day, a bad one")
+    ] = "training",
     out: Annotated[
         Path, typer.Option("-o", "--out", metavar="DIR", help="folder for the files; made if missing")
     ] = Path("demo"),
@@ -35,8 +38,10 @@ def demo(
     Example: svev demo --seconds 5
 
     Example: svev demo --bus firewire
+
+    Example: svev demo --scenario hard --seconds 12
     """
-    result = run_demo(bus, seconds, out, aside, analyze=analyze)
+    result = run_demo(bus, scenario, seconds, out, aside, analyze=analyze)
     if as_json:
         console.print_json(result)
         return
@@ -52,10 +57,10 @@ def demo(
     console.say(f"truth              {result['truth']}")
     if result["analysis"] is not None:
         _say_measured(result["analysis"])
-        log, survey = Path(result["log"]), result["analysis"]["survey"]
-        again = ["svev", "analyze", str(log), "--survey", survey, "-o", f"{log.with_suffix('')}-again"]
-        console.say(f"survey             {survey}")
-        console.say(f"measure it again   {shlex.join(again)}")
+    log, survey = Path(result["log"]), result["survey"]
+    again = ["svev", "analyze", str(log), "--survey", survey, "-o", f"{log.with_suffix('')}-again"]
+    console.say(f"survey             {survey}")
+    console.say(f"measure it again   {shlex.join(again)}")
 
 
 def _say_measured(analysis: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.cameras.comparison import scene_of_calibration
 from analysis.cameras.live_watch import LiveWatch
-from analysis.cameras.moves import Block, find_moves, turn_words
+from analysis.cameras.moves import Block, Move, find_moves, move_said, turn_words
 from analysis.cameras.oriented_scene import OrientedScene, scene_of_survey
 from analysis.cameras.poses_file import Calibration, KnownBall
 from analysis.cameras.standing import FrameShake, Standing, steadied
@@ -18,6 +18,7 @@ from analysis.scene.naming import MODEL_SIGMA
 from photogrammetry.geometry.rotation import rotation_from_vector
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
+from rig.transport.wire import to_builtins
 from tests.analysis.cameras.moving_hill import Film, moving, shaken_film, shaken_scene
 from tests.analysis.scene.hill import oriented, survey_json, training
 from tests.analysis.simulated import true_cameras
@@ -148,6 +149,13 @@ def test_blocks_that_scatter_alike_show_no_move() -> None:
         drifting = [Block(b.first, b.last, b.turn + np.radians((0, 6e-4, 0)) * b.first, b.variance) for b in blocks]
         assert find_moves(drifting, 1)[0].drift
     assert alarms == 0  # 0.03 are expected
+
+
+def test_a_move_in_words_has_a_form_in_json() -> None:
+    said = move_said(
+        "K2", np.radians((0.02, 0.05, 0.03)), np.array((0.02, 0.0, -0.01)), Move(True, 1, 90, np.zeros(3), 0.0)
+    )
+    assert to_builtins(said)["values"]["how"]["values"]["metres"] == 0.022
 
 
 def test_turns_are_said_in_directions() -> None:

@@ -277,7 +277,8 @@ def test_the_trash_is_emptied_of_what_is_old(folder: Path) -> None:
     write_log(folder / "jump.mcap", (ALL_OK,))
     os.utime(folder / "jump.mcap", ns=(0, 0))  # recorded long ago, deleted now
     catalogue.change_session("jump", {"bib": "3"})
-    (folder / "jump.truth.json").write_text("{}")
+    for kind in ("truth", "survey"):
+        (folder / f"jump.{kind}.json").write_text("{}")
     catalogue.delete("jump")
     assert catalogue.purge(older_than_s=3600).recordings == 0
     assert catalogue.entry("jump").deleted

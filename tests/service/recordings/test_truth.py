@@ -35,9 +35,18 @@ def _truth(folder: Path, rig: RigSettings, times: Iterable[tuple[int, float]]) -
     """The truth of a recording of pulses with these numbers at these times in hill pulses."""
     write = simulated_truth(rig, EPOCH)
     assert write is not None
-    write(folder / "truth.json", [(PulseNumber(n), HostNs(EPOCH + round(t * 1e9 / RATE_HZ))) for n, t in times])
-    assert [path.name for path in folder.iterdir()] == ["truth.json"], "nothing half written is left"
+    survey = folder / "survey.json"
+    write(folder / "truth.json", survey, [(PulseNumber(n), HostNs(EPOCH + round(t * 1e9 / RATE_HZ))) for n, t in times])
+    assert sorted(path.name for path in folder.iterdir()) == ["survey.json", "truth.json"], (
+        "nothing half written is left"
+    )
     content: dict[str, Any] = json.loads((folder / "truth.json").read_text())
+    surveyed = json.loads(survey.read_text())
+    for name, camera in surveyed["cameras"].items():
+        assert camera.items() <= content["cameras"][name].items(), "the survey describes the images of the log"
+    balls = {name for name, ball in content["balls"].items() if ball["role"] == "control"}
+    assert set(surveyed["points"]) == balls, "fallen balls were surveyed too"
+    assert set(surveyed["cameras"]) == {camera.name for camera in rig.cameras}
     return content
 
 
@@ -69,11 +78,12 @@ def test_the_truth_stands_beside_each_log_that_can_have_one(tmp_path: Path) -> N
     writer = TruthWriter(told.append)
     seen: dict[Path, list[tuple[PulseNumber, HostNs]]] = {}
 
-    def write(path: Path, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
+    def write(path: Path, survey: Path, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
         seen[path] = list(pulses)
         if "full" in path.name:
             raise OSError(28, "No space left on device")
         path.write_text("{}")
+        survey.write_text("{}")
 
     logs = [tmp_path / f"{name}.mcap" for name in ("failed", "moved", "full", "good")]
     for log in logs:
@@ -84,6 +94,7 @@ def test_the_truth_stands_beside_each_log_that_can_have_one(tmp_path: Path) -> N
     writer.closed([logs[0]])
     assert writer.wait(60)
     assert [path.name for path in tmp_path.glob("*.truth.json")] == ["good.truth.json"]
+    assert [path.name for path in tmp_path.glob("*.survey.json")] == ["good.survey.json"]
     assert [event.message.partition(": ")[::2] for event in told] == [
         (
             "what the simulated cameras saw is not written beside failed.mcap",
@@ -101,7 +112,7 @@ def test_what_is_not_written_when_the_service_ends_is_given_up_whole(tmp_path: P
     writer = TruthWriter(told.append)
     ending = threading.Event()
 
-    def write(path: Path, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
+    def write(path: Path, survey: Path, pulses: Iterable[tuple[PulseNumber, HostNs]]) -> None:
         for number, _ in pulses:
             assert number == 1, "the second one is never asked for"
             assert ending.wait(60)

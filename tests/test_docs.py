@@ -10,14 +10,17 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import typer.main
 from _pytest.mark.structures import ParameterSet
 from typer.core import TyperGroup
 
+from analysis.scene.orientation import orient_images
 from analysis.scene.survey import read_survey
 from recorder.publishing.keys import make_keys
 from svev import cli
+from tests.analysis.scene.hill import training, training_detections, training_images
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
@@ -123,11 +126,14 @@ def test_troubleshooting_quotes_the_code() -> None:
         assert any(pattern.search(message) for message in messages), words
 
 
-def test_the_survey_of_the_page_on_measuring_is_read(tmp_path: Path) -> None:
+def test_the_survey_of_the_page_on_measuring_fits_the_simulated_hill(tmp_path: Path) -> None:
     (example,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "measuring.md").read_text(), re.DOTALL)
-    path = tmp_path / "hill.json"
+    path = tmp_path / "survey.json"
     path.write_text(example)
-    assert read_survey(path).surveyed().names == ("B1", "B2", "B3", "B4")
+    scene = orient_images(training_images(), read_survey(path), training_detections())
+    for camera in training().cameras:
+        assert np.allclose(scene.cameras[camera.name].position, camera.X0, atol=0.2), camera.name
+    assert "15 of 15 surveyed balls in sight named" in scene.messages[0]
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ from service.aiming.places import Balls, of_system, places, standing
 _NO_FILE: Final = Statement(
     code="balls_no_file",
     text="where the balls should be is not known: the rig file names no survey of them",
-    advice='name it, survey = "hill.json" under [analysis]; before there is one, name the plan, plan = "hill.toml"',
+    advice='name it, survey = "survey.json" under [analysis]; before there is one, name the plan, plan = "plan.toml"',
 )
 
 
@@ -63,7 +63,7 @@ def known_balls(rig: RigSettings, camera: CameraSettings, folder: Path) -> Camer
         code="balls_not_oriented",
         text=f"{camera.name} is not oriented yet, so where it shows the balls is not known",
         advice="record five seconds with the balls in sight once; or give its approximate pose in the survey, or name "
-        'the plan in the rig file, plan = "hill.toml"',
+        'the plan in the rig file, plan = "plan.toml"',
         values={"camera": camera.name},
     )
     return nothing.model_copy(update={"statement": statement})

@@ -55,7 +55,7 @@ def analyze_command(
     Exit codes: 0 measured; 2 bad input; 3 nobody jumps in the log, or the balls do not determine the cameras; 4 the
     adjustment did not converge, or the disk refuses.
 
-    Example: svev analyze recordings/jump.mcap --survey hill.json --out results/jump
+    Example: svev analyze recordings/jump.mcap --survey survey.json --out results/jump
     """
     refuse_existing(out / result_file.NAME, force=force)
     source = read_source(survey, calibration)

@@ -49,7 +49,7 @@ def digitize_command(
 
     Exit codes: 0 ended by a signal; 2 bad input.
 
-    Example: svev digitize recordings/jump.mcap --survey hill.json
+    Example: svev digitize recordings/jump.mcap --survey survey.json
     """
     files = DeskFiles(log, marks or digitized_path(log), measured_path(log), landmarks)
     source: Source | None = None if survey is None and calibration is None else read_source(survey, calibration)

@@ -61,7 +61,7 @@ def worker_command(
 
     Exit codes: 0; 2 bad input, or the address cannot be used; 4 the disk refuses.
 
-    Example: svev worker --connect tcp://127.0.0.1:5556 --survey hill.json
+    Example: svev worker --connect tcp://127.0.0.1:5556 --survey survey.json
     """
     source = Source(connect, reliable, None if curve_public_key is None else public_key(curve_public_key))
     with zmq.Context() as context, context.socket(zmq.PUB) as socket:

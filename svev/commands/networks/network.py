@@ -50,7 +50,7 @@ def import_command(
 
     Exit codes: 0 done, 2 bad input.
 
-    Example: svev network import K1.yml K2.yml K3.yml balls.csv -o hill.json
+    Example: svev network import K1.yml K2.yml K3.yml balls.csv -o survey.json
     """
     inside = [path / each.name for path in files if path.is_dir() for each in path.iterdir()]
     refuse_overwriting(output, *files, *inside)

@@ -72,7 +72,7 @@ def orient(
     Exit codes: 0 oriented, 2 bad input, 3 not solvable (the result says what is missing, or which poses are possible
     where several are), 4 not converged, or refused because images and survey contradict each other.
 
-    Example: svev orient hill.json --calibration cameras.json -o poses.json --report orientation
+    Example: svev orient network.json --calibration calibration.json -o poses.json --report orientation
     """
     refuse_overwriting(output, network, calibration)
     refuse_existing(output, *in_report(report), force=force)

@@ -55,8 +55,8 @@ export const statements = {
   camera_absent: ["{camera} er ikke der", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
   camera_absent_why: ["{camera} er ikke der: {reason}", "sjekk strøm og kabel; kameraet kobles til på nytt av seg selv"],
 
-  balls_no_file: ["hvor ballene skal være, er ikke kjent: riggfilen nevner ingen innmåling av dem", "skriv den inn, survey = \"hill.json\" under [analysis]; før den finnes, skriv inn planen, plan = \"hill.toml\""],
-  balls_not_oriented: ["{camera} er ikke orientert ennå, så hvor det viser ballene, er ikke kjent", "gjør ett opptak på fem sekunder med ballene i sikte; eller gi kameraets omtrentlige plass i innmålingen, eller planen i riggfilen, plan = \"hill.toml\""],
+  balls_no_file: ["hvor ballene skal være, er ikke kjent: riggfilen nevner ingen innmåling av dem", "skriv den inn, survey = \"survey.json\" under [analysis]; før den finnes, skriv inn planen, plan = \"plan.toml\""],
+  balls_not_oriented: ["{camera} er ikke orientert ennå, så hvor det viser ballene, er ikke kjent", "gjør ett opptak på fem sekunder med ballene i sikte; eller gi kameraets omtrentlige plass i innmålingen, eller planen i riggfilen, plan = \"plan.toml\""],
   balls_by_plan: ["{camera} viser ballene der planen har dem, og blir ikke orientert: {why}"],
   balls_unknown: ["hvor {camera} viser ballene, er ikke kjent: {why}"],
 

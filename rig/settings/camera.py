@@ -21,8 +21,8 @@ class Region(StrictModel):
 
     x: int = Field(0, ge=0, description="first column")
     y: int = Field(0, ge=0, description="first row")
-    width: int = Field(640, gt=0, le=16384)
-    height: int = Field(480, gt=0, le=16384)
+    width: int = Field(640, gt=0, le=16384, description="columns")
+    height: int = Field(480, gt=0, le=16384, description="rows")
 
 
 class IidcSettings(StrictModel):
@@ -43,13 +43,15 @@ class CameraSettings(StrictModel):
     """One camera. The order of the cameras in the file is their order in the triplet, from left to right."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,15}$", description="short name, e.g. K1")
-    backend: Backend
+    backend: Backend = Field(
+        description="aravis: GigE Vision; iidc: FireWire; sim: simulated inside the process; replay: from a log"
+    )
     address: str = Field(
         "",
         description="aravis: IP address; iidc: GUID (hexadecimal); replay: path of a log, "
         "relative to the working directory, the same for all cameras; name says which camera of it",
     )
-    region: Region = Region()
+    region: Region = Field(Region(), description="part of the sensor that is read out")
     calibrated_region: Region | None = Field(
         None,
         description="the region with which the camera was calibrated, if it is another one; written when the region is "
@@ -61,10 +63,10 @@ class CameraSettings(StrictModel):
         "or not. iidc: Mono8, or 16 bits of which so many are significant: Mono10, Mono12, Mono16",
     )
     exposure_us: float = Field(2000.0, gt=0, le=1_000_000, description="exposure time, microseconds")
-    gain_db: float = Field(0.0, ge=0, le=60)
+    gain_db: float = Field(0.0, ge=0, le=60, description="gain of the camera; more is brighter and noisier")
     trigger_input: str = Field("Line0", description="camera input that the trigger cable is plugged into")
-    trigger_edge: Literal["rising", "falling"] = "rising"
-    iidc: IidcSettings = IidcSettings()
+    trigger_edge: Literal["rising", "falling"] = Field("rising", description="edge of the pulse that exposes")
+    iidc: IidcSettings = Field(IidcSettings(), description="only for backend iidc")
 
     @property
     def frame_bytes(self) -> int:

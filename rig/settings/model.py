@@ -32,7 +32,10 @@ _TRIPLET_BYTES_MAX: Final = 255 << 20
 class RecorderSettings(StrictModel):
     """Where recordings are written and how much is buffered on the way."""
 
-    directory: Path = Field(Path("recordings"), description="relative to the working directory")
+    directory: Path = Field(
+        Path("recordings"),
+        description="folder of the recordings, relative to the working directory; --data or --out goes before",
+    )
     fallback_directory: Path | None = Field(
         None,
         description="folder on another disk, relative to the working directory: a recording whose disk fails, hangs or "
@@ -102,7 +105,7 @@ class ServiceSettings(StrictModel):
         le=60,
         description="delay of the live picture on the coach's screen, so that a jump can be seen again",
     )
-    webhook: WebhookSettings | None = None
+    webhook: WebhookSettings | None = Field(None, description="notifications for people who are elsewhere")
 
 
 class MotionSettings(StrictModel):
@@ -170,15 +173,17 @@ class SimulationSettings(StrictModel):
 class RigSettings(StrictModel):
     """One rig: everything that a recording needs to know."""
 
-    name: str = Field(min_length=1, max_length=80)
-    cameras: Annotated[tuple[CameraSettings, ...], Field(min_length=1, max_length=8)]
-    trigger: Trigger = ExternalTrigger()
-    recorder: RecorderSettings = RecorderSettings()
-    network: NetworkSettings = NetworkSettings()
-    service: ServiceSettings = ServiceSettings()
-    analysis: AnalysisSettings | None = None
-    automatic: AutomaticSettings = AutomaticSettings()
-    simulation: SimulationSettings | None = None
+    name: str = Field(min_length=1, max_length=80, description="of the rig, for people; stands in every log")
+    cameras: Annotated[tuple[CameraSettings, ...], Field(min_length=1, max_length=8)] = Field(
+        description="from left to right, as their frames stand in the triplet"
+    )
+    trigger: Trigger = Field(ExternalTrigger(), description="who makes the pulses")
+    recorder: RecorderSettings = Field(RecorderSettings(), description="where recordings go, and what is buffered")
+    network: NetworkSettings = Field(NetworkSettings(), description="how frames are received and triplets published")
+    service: ServiceSettings = Field(ServiceSettings(), description="what the service does by itself")
+    analysis: AnalysisSettings | None = Field(None, description="measures the jumper, live and in every log")
+    automatic: AutomaticSettings = Field(AutomaticSettings(), description="recordings that begin by themselves")
+    simulation: SimulationSettings | None = Field(None, description="simulated cameras instead of real ones")
     calibration: Path | None = Field(
         None,
         description="result file of svev calibrate or svev orient, relative to the rig file: its cameras' interior "

@@ -8,6 +8,7 @@ from rig.errors import BadInputError
 from rig.settings.file import CONFIG, load_rig, rig_schema
 from rig.settings.strict_toml import read_toml
 from rig.settings.trigger import ExternalTrigger
+from tests.support import rig_keys
 
 RIGS = sorted((CONFIG / "rigs").glob("*.toml"))
 
@@ -53,6 +54,13 @@ def test_the_shipped_schema_is_up_to_date() -> None:
     assert (CONFIG / "rig.schema.json").read_text(encoding="utf-8") == rig_schema(), (
         "run: svev schema -o config/rig.schema.json"
     )
+
+
+def test_the_page_on_the_rig_file_has_the_keys_of_the_schema() -> None:
+    page = rig_keys.PAGE.read_text(encoding="utf-8")
+    assert page == rig_keys.written_in(page), "run: python -m tests.support.rig_keys"
+    for key in ("settle_s", "packet_socket", "resend"):
+        assert f"| `{key}` |" in page
 
 
 def test_the_schema_is_a_schema() -> None:

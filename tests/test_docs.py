@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -72,6 +73,18 @@ def test_links_lead_somewhere(page: Path) -> None:
         if anchor:
             headings = re.findall(r"^#+ (.*)$", there.read_text(), re.MULTILINE)
             assert anchor in {_anchor(heading) for heading in headings}, target
+
+
+@pytest.mark.parametrize("drawing", sorted(ROOT.glob("docs/images/*.svg")), ids=_name)
+def test_drawings_are_for_light_and_dark_and_fetch_nothing(drawing: Path) -> None:
+    text = drawing.read_text()
+    root = ET.fromstring(text)  # noqa: S314
+    assert root.get("aria-label")
+    assert "prefers-color-scheme: dark" in text
+    for part in root.iter():
+        assert not part.tag.endswith(("script", "image", "use", "foreignObject"))
+        assert not [name for name in part.attrib if name.endswith("href") or name == "style"]
+    assert any(f"images/{drawing.name})" in page.read_text() for page in PAGES), "no page shows it"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)

@@ -11,7 +11,6 @@ import errno
 import os
 import re
 import resource
-import shlex
 import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,12 +18,14 @@ from importlib import import_module
 from importlib.metadata import version
 from io import StringIO
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
 from typer._completion_classes import completion_init
 from typer.core import TyperGroup
 
+from rig.doctor_call import rig_in_use
 from rig.errors import BadInputError, SvevError
 from rig.host.file_names import NAME_MAX
 from svev import console
@@ -164,7 +165,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             command = command_line(argv[:1])
         else:
             command = command_line() if any(word in _COMMANDS for word in argv) else _overview()
-        code = command(argv, prog_name="svev", standalone_mode=False)
+        with rig_in_use(_rig_file(argv)):
+            code = command(argv, prog_name="svev", standalone_mode=False)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 1
     except _USAGE_ERROR as error:
@@ -176,7 +178,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (SvevError, OSError) as error:
         if debug:
             traceback.print_exc()
-        told = _for_this_rig(_one_line(error), argv)
+        told = _one_line(error)
         console.complain(told)
         code = error.exit_code if isinstance(error, SvevError) else 2
         if as_json:
@@ -256,13 +258,11 @@ def _explain_usage(error: Any, *, as_json: bool) -> int:
     return code
 
 
-def _for_this_rig(text: str, argv: Sequence[str]) -> str:
-    """The text, where `svev doctor` is told to look at the rig of this command line, which it would not by itself."""
+def _rig_file(argv: Sequence[str]) -> Path | None:
+    """The rig file that a command line names."""
     rig = next((after for option, after in pairwise(argv) if option == "--rig"), None)
     rig = rig or next((word.partition("=")[2] for word in argv if word.startswith("--rig=")), None)
-    return (
-        text if rig is None else re.sub(r"svev doctor(?! --)", lambda _: f"svev doctor --rig {shlex.quote(rig)}", text)
-    )
+    return Path(rig) if rig else None
 
 
 def _one_line(error: SvevError | OSError) -> str:

@@ -20,6 +20,7 @@ from msgspec import UNSET
 from recorder.live.unpacking import unpacker
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, HostNs, UtcAnchor, host_now
+from rig.doctor_call import with_rig_in_use
 from rig.frame import FrameStatus, Record, RecordKind, StampedPixels
 from rig.images.pixels import Stored
 from rig.phrase import Phrase, phrase, plain
@@ -301,12 +302,14 @@ class Assembler:
             case RecordKind.CONNECTED:
                 self._join(camera, record, plain(record.text))
             case RecordKind.DISCONNECTED:
-                self.disconnected(camera, plain(record.text), record.host_time)
+                self.disconnected(camera, plain(with_rig_in_use(record.text)), record.host_time)
             case RecordKind.LIMITS:
                 limits = RegionLimits.model_validate_json(record.text)
                 self._limits.append(CameraLimits(camera=camera, limits=limits))
             case RecordKind.NOTICE:
-                self._changes.append(CameraChanged(camera=camera, news=CameraNews.NOTICE, said=plain(record.text)))
+                self._changes.append(
+                    CameraChanged(camera=camera, news=CameraNews.NOTICE, said=plain(with_rig_in_use(record.text)))
+                )
 
     def _place(self, camera: int, record: Record, pulse: OpenPulse) -> None:
         """Copy a frame into its triplet, or let it wait in its ring until a buffer is free."""

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from rig.clocks import HostNs, host_now
+from rig.doctor_call import doctor_call
 from rig.errors import ProcessDiedError
 from rig.events import Event, Level
 from rig.health import Health
@@ -285,8 +286,9 @@ class RigProcesses:
                 self.recorder_died, self.ready, self.warm, self.health = True, False, False, None
                 self.rate = None
                 self.cameras = [CameraPresence()] * len(self._names)
-                text = "the recorder process ended ({how}): if it recurs, run svev doctor"
-                raise ProcessDiedError(phrase("why_recorder_ended", text, how=child.ending() or ""))
+                text = "the recorder process ended ({how}): if it recurs, run {doctor}"
+                how = child.ending() or ""
+                raise ProcessDiedError(phrase("why_recorder_ended", text, how=how, doctor=doctor_call()))
 
     def _tend_helper(self, child: Child) -> None:
         name, now = child.spec.name, time.monotonic()

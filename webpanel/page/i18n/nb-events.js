@@ -150,7 +150,7 @@ export const events = {
   act_called: ["gjorde kallet {call}"],
 
   why_exposed: ["alle som når {address}, ser bildene: publiser på 127.0.0.1, eller med en nøkkel (svev keys)"],
-  why_recorder_ended: ["opptaksprosessen tok slutt ({how}): skjer det igjen, kjør svev doctor"],
+  why_recorder_ended: ["opptaksprosessen tok slutt ({how}): skjer det igjen, kjør {doctor}"],
   why_other_settings: ["det får andre innstillinger, og er straks tilbake"],
   why_balls_plan: ["{path}: har {count} plasser for {camera}; gi hvert kamera i riggen én, med navnet fra riggfilen"],
   why_balls_size: ["{path}: {camera} har bilder på {there} der, og på {here} i riggfilen; rett det ene"],

@@ -10,6 +10,7 @@ import numpy as np
 
 from analysis.cameras.frames import LogFrames
 from analysis.targets.detection import Sight, find_targets
+from analysis.targets.moving import MOVED, shift
 from analysis.targets.network_of import FEWEST_CORNERS, Picture
 from analysis.targets.pattern import Layout
 from rig.errors import BadInputError
@@ -20,7 +21,6 @@ _LOG: Final = ".mcap"
 _LARGEST_FILE: Final = 1 << 29  # bytes
 _LOOKED_AT: Final = 90  # pulses of a log, evenly spread
 _KEPT: Final = 24  # pictures of a camera out of a log
-_MOVED: Final = 0.03  # of the picture's diagonal, that the target must have moved between two of them
 _SHARP: Final = 1.5  # times the usual width of edges, at most
 #: The sensor's own rows and columns: a picture that its file says to turn would be one of another camera.
 _READ: Final = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
@@ -138,24 +138,15 @@ def _different(pictures: Sequence[Picture]) -> list[Picture]:
         return list(pictures[:1])
     usual = float(np.median([picture.sight.blur for picture in full]))
     full = [picture for picture in full if picture.sight.blur <= _SHARP * usual]
-    least = _MOVED * float(np.hypot(*full[0].sight.size))
+    least = MOVED * float(np.hypot(*full[0].sight.size))
     while True:
         kept: list[Picture] = []
         for picture in full:
-            if all(_shift(picture.sight, other.sight) > least for other in kept):
+            if all(shift(picture.sight, other.sight) > least for other in kept):
                 kept.append(picture)
         if len(kept) <= _KEPT:
             return kept
         least *= 1.3
-
-
-def _shift(one: Sight, other: Sight) -> float:
-    """Median distance (px) between the same corners of two pictures; infinite if they share few."""
-    common = one.corners.keys() & other.corners.keys()
-    if len(common) < FEWEST_CORNERS:
-        return np.inf
-    moves = [np.hypot(one.corners[k].x - other.corners[k].x, one.corners[k].y - other.corners[k].y) for k in common]
-    return float(np.median(moves))
 
 
 def _require_one_size(pictures: Sequence[Picture]) -> None:

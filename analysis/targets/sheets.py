@@ -1,12 +1,13 @@
 """Sheets of targets to print: a ChArUco board, and single targets to cut out, each page with a line to measure."""
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, TypeAlias
 
 from analysis.targets.pattern import BAR, CUT, FIELDS, FIRST_SINGLE, LAST_SINGLE, MARKER, Layout, marker
 from analysis.targets.pdf import Page
 from rig.errors import BadInputError
 
+_Box: TypeAlias = tuple[float, float, float, float]  # x, y, width, height, mm
 _A4: Final = (210.0, 297.0)
 _MARGIN: Final = 8.0  # that printers leave, mm
 _FOOT: Final = 14.0  # for the check line, mm
@@ -21,14 +22,33 @@ def board_page(layout: Layout) -> Page:
     width, height = layout.columns * layout.board_mm, layout.rows * layout.board_mm
     page = _page(width, height)
     left, top = (page.width - width) / 2.0, (page.height - _FOOT - height) / 2.0
+    for x, y, across, down in _board(layout):
+        page.box(left + x, top + y, across, down)
+    _foot(page, f"ChArUco {layout.columns} x {layout.rows}, squares {layout.board_mm:g} mm, DICT_5X5_250")
+    return page
+
+
+def board_geometry(layout: Layout) -> dict[str, Any]:
+    """What is black on the board, for programs that draw it: `svev-board/1`; lengths in mm."""
+    board = {
+        "width_mm": layout.columns * layout.board_mm,
+        "height_mm": layout.rows * layout.board_mm,
+        "cell_mm": layout.board_mm * MARKER / FIELDS / 2.0,
+        "margin_mm": layout.board_mm / 2.0,
+        "black": [[round(part, 6) for part in box] for box in _board(layout)],
+    }
+    return {"format": "svev-board/1", "columns": layout.columns, "rows": layout.rows, "board": board}
+
+
+def _board(layout: Layout) -> Iterator[_Box]:
+    """The black boxes of the board, from its upper left corner."""
+    side = layout.board_mm
     for y in range(layout.rows):
         for x in range(layout.columns):
             if (x + y) % 2 == 0:
-                page.box(left + x * layout.board_mm, top + y * layout.board_mm, layout.board_mm, layout.board_mm)
+                yield x * side, y * side, side, side
     for code, (x, y) in layout.squares.items():
-        _marker(page, code, left + (x + 0.5) * layout.board_mm, top + (y + 0.5) * layout.board_mm, layout.board_mm)
-    _foot(page, f"ChArUco {layout.columns} x {layout.rows}, squares {layout.board_mm:g} mm, DICT_5X5_250")
-    return page
+        yield from _marker(code, (x + 0.5) * side, (y + 0.5) * side, side)
 
 
 def target_pages(layout: Layout, codes: Sequence[int]) -> list[Page]:
@@ -64,8 +84,8 @@ def _page(width: float, height: float) -> Page:
     return Page(max(width + 2.0 * _MARGIN, _CHECK + 2.0 * _MARGIN), height + _MARGIN + _FOOT)
 
 
-def _marker(page: Page, code: int, x: float, y: float, side: float) -> None:
-    """A marker about a place, in a white square with this side; each row's black fields are drawn in one."""
+def _marker(code: int, x: float, y: float, side: float) -> Iterator[_Box]:
+    """A marker about a place, in a white square with this side; neighbouring black fields of a row are one box."""
     field = side * MARKER / FIELDS
     left, top = x - FIELDS * field / 2.0, y - FIELDS * field / 2.0
     for row, fields in enumerate(marker(code)):
@@ -74,7 +94,7 @@ def _marker(page: Page, code: int, x: float, y: float, side: float) -> None:
             if black and begin is None:
                 begin = column
             elif not black and begin is not None:
-                page.box(left + begin * field, top + row * field, (column - begin) * field, field)
+                yield left + begin * field, top + row * field, (column - begin) * field, field
                 begin = None
 
 
@@ -84,7 +104,8 @@ def _single(page: Page, code: int, x: float, y: float, side: float) -> None:
     page.box(x - half, y + half, side, depth)
     page.box(x - half - depth, y - half, depth, side)
     page.box(x + half, y - half, depth, side)
-    _marker(page, code, x, y, side)
+    for box in _marker(code, x, y, side):
+        page.box(*box)
     page.text(x - cut + 0.02 * side, y + cut - 0.03 * side, f"{code}", 0.05 * side)
     for along in (-cut, cut):
         page.line(x - cut, y + along, x + cut, y + along, 0.1)

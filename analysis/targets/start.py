@@ -130,11 +130,16 @@ def _matrix(c: float, size: tuple[int, int]) -> Floats:
 
 
 def _plane_pose(plane: _Plane, matrix: Floats) -> tuple[Floats, Floats] | None:
-    """Rotation and translation of a plane, the better of the two that its perspective allows."""
+    """Rotation and translation of a plane, the better of the two that its perspective allows, seen from its front."""
     found, rotations, shifts, _ = cv2.solvePnPGeneric(
         plane.flat, plane.seen[:, None], matrix, None, flags=cv2.SOLVEPNP_IPPE
     )
-    return _pose(rotations[0], shifts[0]) if found else None
+    poses = [_pose(*each) for each in zip(rotations, shifts, strict=True)] if found else []
+    if not poses or poses[0][0][:, 2] @ poses[0][1] < 0.0:
+        return poses[0] if poses else None
+    # a plane that is seen straight from its front has no perspective, which that method needs
+    found, rotation, shift = cv2.solvePnP(plane.flat, plane.seen[:, None], matrix, None, flags=cv2.SOLVEPNP_ITERATIVE)
+    return _pose(rotation, shift) if found else None
 
 
 def _resected(sight: Sight, places: Mapping[str, Floats], matrix: Floats) -> tuple[Floats, Floats] | None:

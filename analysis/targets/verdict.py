@@ -9,22 +9,18 @@ import numpy as np
 
 from analysis.targets.network_of import Picture
 from analysis.targets.pattern import Layout, target_of
+from analysis.targets.views import PICTURES, any_rolled, covered_cells, empty_parts
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.camera_model import Lens, linearise, undistort
-from rig.arrays import Floats, Integers
+from rig.arrays import Floats
 from rig.errors import BadInputError
 
 #: What measuring jumps asks for (paper, section 4): 20 mm in the 20 m that a picture is wide.
 WANTED: Final = 1000.0
 #: The lens may take so much of that: with a third the whole error grows by a twentieth.
 _SHARE: Final = 1.0 / 3.0
-#: The paper's frame was taken in nine pictures.
-_PICTURES: Final = 9
 FEWEST_PICTURES: Final = 3
-_CELLS: Final = (8, 6)
-_COVERED: Final = 0.7
 _ASIDE_DEG: Final = 30.0
-_ROLLED_DEG: Final = (60.0, 120.0)
 _ONE_POSE_DEG: Final = 3.0
 _ONE_POSE_NEARER: Final = 1.05
 _BLURRED: Final = 1.6  # times the usual width of edges
@@ -75,7 +71,7 @@ def require_poses(pictures: Sequence[Picture], rotations: Floats, positions: Flo
         what = "1 picture shows" if len(mine) == 1 else f"{len(mine)} pictures show"
         if len(mine) < FEWEST_PICTURES:
             raise BadInputError(
-                f"camera {camera}: {what} the targets, and no calibration comes of that; take {_PICTURES} to 15, from "
+                f"camera {camera}: {what} the targets, and no calibration comes of that; take {PICTURES} to 15, from "
                 "all sides, some with the camera turned by 90 degrees"
             )
         turns = [np.degrees(_turn(rotations[i].T @ rotations[j])) for i, j in combinations(mine, 2)]
@@ -153,9 +149,11 @@ def lens_sigmas(a: Adjustment, camera: int, size: tuple[int, int]) -> tuple[Floa
 
 
 def _advice(a: Adjustment, camera: int, pictures: Sequence[Picture]) -> Iterator[str]:
-    if len(pictures) < _PICTURES:
-        yield f"take more pictures: {len(pictures)} of {_PICTURES} to 15"
-    yield from _empty_parts(pictures)
+    if len(pictures) < PICTURES:
+        yield f"take more pictures: {len(pictures)} of {PICTURES} to 15"
+    covered, empty = empty_parts(covered_cells([picture.sight for picture in pictures]))
+    if empty:
+        yield f"fill the picture: targets cover {covered:.0%} of it; show them in its {', '.join(empty)} part"
     mine = [k for k, image in enumerate(a.network.images) if image.camera == camera]
     rotations = a.state.rotation[mine]
     pairs = list(combinations(range(len(mine)), 2))
@@ -165,8 +163,7 @@ def _advice(a: Adjustment, camera: int, pictures: Sequence[Picture]) -> Iterator
             f"take pictures from more to the side, also from above and below: the views differ by {aside:.0f} degrees "
             f"at most, {_ASIDE_DEG:.0f} to 60 are good"
         )
-    rolls = [_roll(rotations[i].T @ rotations[j]) for i, j in pairs]
-    if not any(_ROLLED_DEG[0] <= roll <= _ROLLED_DEG[1] for roll in rolls):
+    if not any_rolled(rotations):
         yield "turn the camera by 90 degrees for two more pictures: principal point and pose are not apart"
     usual = float(np.median([picture.sight.blur for picture in pictures]))
     if usual > _UNSHARP_PX:
@@ -185,33 +182,6 @@ def _advice(a: Adjustment, camera: int, pictures: Sequence[Picture]) -> Iterator
 
 def _between(one: Floats, other: Floats) -> float:
     return float(np.degrees(np.arccos(np.clip(one @ other, -1.0, 1.0))))
-
-
-def _roll(relative: Floats) -> float:
-    """Degrees about the optical axis, 0 to 180."""
-    return float(np.degrees(abs(np.arctan2(relative[1, 0] - relative[0, 1], relative[0, 0] + relative[1, 1]))))
-
-
-def covered_cells(pictures: Sequence[Picture]) -> Integers:
-    """(6, 8) how many corners all pictures of a camera show in each part of the picture, from the top left."""
-    width, height = pictures[0].sight.size
-    places = np.array([(corner.x, corner.y) for picture in pictures for corner in picture.sight.corners.values()])
-    counts, _, _ = np.histogram2d(
-        places[:, 1], places[:, 0], bins=_CELLS[::-1], range=((-0.5, height - 0.5), (-0.5, width - 0.5))
-    )
-    return np.asarray(counts, np.intp)
-
-
-def _empty_parts(pictures: Sequence[Picture]) -> Iterator[str]:
-    cells = covered_cells(pictures)
-    covered = float((cells > 0).mean())
-    if covered >= _COVERED:
-        return
-    names = [f"{v} {h}".strip() for v in ("upper", "middle", "lower") for h in ("left", "", "right")]
-    shares = [(cells[2 * i : 2 * i + 2, columns] > 0).mean() for i in range(3)
-              for columns in (slice(0, 3), slice(3, 5), slice(5, 8))]  # fmt: skip
-    empty = [name for name, share in zip(names, shares, strict=True) if share < 0.5]
-    yield f"fill the picture: targets cover {covered:.0%} of it; show them in its {', '.join(empty) or 'edges'} part"
 
 
 def _side_ratios(layout: Layout, code: int, place: Mapping[str, Floats]) -> Iterator[float]:

@@ -5,6 +5,7 @@ import numpy as np
 from rig.images.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images import stamp
+from simrig.images.board_view import BoardView
 from simrig.images.live_view import LiveView
 from simrig.images.still_view import StillView
 from simrig.world.conditions.camera_motion import CameraMotion
@@ -37,8 +38,10 @@ class CameraView:
         self._stamped = camera if scenario.stamp else None
         self._rate_hz = rate_hz
         rng = np.random.default_rng((scenario.seed, camera, 99))
-        self._view: StillView | LiveView
-        if _is_live(scenario, camera):
+        self._view: StillView | LiveView | BoardView
+        if scenario.board is not None:
+            self._view = BoardView(scenario, scenario.board, camera, width, height, rate_hz, bits)
+        elif _is_live(scenario, camera):
             self._view = LiveView(scenario, camera, width, height, rate_hz, bits)
         else:
             self._view = StillView(scenario, camera, width, height, rate_hz, rng, bits)

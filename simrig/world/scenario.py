@@ -17,6 +17,7 @@ from rig.errors import BadInputError
 from rig.images.viewing import look_at
 from rig.pulse import HillPulse
 from rig.settings.strict_toml import read_toml, validate
+from simrig.world.board import HeldBoard
 from simrig.world.conditions.effects import (
     FiniteModel,
     LensErrors,
@@ -225,6 +226,7 @@ class Scenario(FiniteModel):
     balls: tuple[Ball, ...] = ()
     ball_radius_m: float = Field(0.095, gt=0.02, le=0.3)
     faults: tuple[Fault, ...] = ()
+    board: HeldBoard | None = None
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> "Scenario":
@@ -235,6 +237,8 @@ class Scenario(FiniteModel):
         for fault in self.faults:
             if fault.camera not in known:
                 raise ValueError(f'fault of camera "{fault.camera}": no such camera; name one of {", ".join(known)}')
+        if self.board is not None and self.board.before not in known:
+            raise ValueError(f'board.before = "{self.board.before}": no such camera; name one of {", ".join(known)}')
         for first, end in self.pauses:
             if not 0 <= first < end:
                 raise ValueError(f"pauses: [{first}, {end}] is empty: give a first pulse of at least 0 and a later end")
@@ -278,6 +282,9 @@ def load_scenario(path: Path) -> Scenario:
 def _content(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     """The keys of a scenario file and of its bases; `above` are the files that lead to it."""
     own = read_toml(path)
+    board = own.get("board")
+    if isinstance(board, dict) and isinstance(board.get("pattern"), str):
+        board["pattern"] = str((path.parent / board["pattern"]).resolve())
     base = own.pop("base", None)
     if base is None:
         return own

@@ -1,5 +1,6 @@
 """`svev target`: targets to print, for calibrating cameras."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -7,7 +8,7 @@ import typer
 
 from analysis.targets.pattern import FIRST_SINGLE, LAST_SINGLE, Layout
 from analysis.targets.pdf import pdf
-from analysis.targets.sheets import board_page, target_pages
+from analysis.targets.sheets import board_geometry, board_page, target_pages
 from svev import console
 from svev.commands.networks.delivery import JsonOption
 from svev.commands.networks.layout import BoardOption, SquareOption, TargetOption, columns_and_rows
@@ -19,7 +20,9 @@ _PRINT = (
 
 
 def target(
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="folder for board.pdf and targets.pdf")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="folder for board.pdf, board.json and targets.pdf")
+    ],
     board: BoardOption = "9x6",
     square_mm: SquareOption = 30.0,
     target_mm: TargetOption = 80.0,
@@ -42,10 +45,12 @@ def target(
     layout = Layout(columns, rows, square_mm, target_mm)
     files = {"board.pdf": [board_page(layout)]}
     files["targets.pdf"] = target_pages(layout, range(FIRST_SINGLE, FIRST_SINGLE + targets))
-    refuse_existing(*(out / name for name in files), force=force)
+    geometry = out / "board.json"
+    refuse_existing(*(out / name for name in files), geometry, force=force)
     out.mkdir(parents=True, exist_ok=True)
     for name, pages in files.items():
         (out / name).write_bytes(pdf(pages))
+    geometry.write_text(json.dumps(board_geometry(layout)) + "\n", encoding="utf-8")
     counts = {name: len(pages) for name, pages in files.items()}
     if as_json:
         console.print_json({"folder": str(out), "pages": counts})

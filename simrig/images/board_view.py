@@ -1,0 +1,108 @@
+"""Renders a board with a printed pattern before a plain wall, by ray, as one camera sees it."""
+
+from typing import Final
+
+import cv2
+import numpy as np
+
+from rig.arrays import Floats
+from rig.images.pixels import Stored
+from rig.pulse import HillPulse
+from simrig.images.scene.drawing import Image
+from simrig.images.sensor import Sensor
+from simrig.world.board import BoardPose, HeldBoard, load_pattern, placed
+from simrig.world.projection import Projection
+from simrig.world.scenario import Scenario
+
+#: Radiances.
+_BLACK: Final = 25.0
+_WHITE: Final = 205.0
+_WALL: Final = 110.0
+_FINE: Final = 4  # rays along a pixel's side, while the board is still
+_MM_PER_M: Final = 1000.0
+_GOLDEN: Final = 0.6180339887498949
+_STEPS: Final = 20  # of finding the ideal place that a lens shows at a given one
+
+
+class BoardView:
+    """Renders one camera's images; the same seed, camera and pulse give the same image.
+
+    Pictures of the board while it is still are drawn finely and once; between them it is drawn coarsely, unblurred.
+
+    Args:
+        scenario: what there is to see.
+        board: that it shows.
+        camera: index of the camera in it.
+        width: width of the image, px.
+        height: height of the image, px.
+        rate_hz: rate of the pulses.
+        bits: of a pixel.
+
+    Raises:
+        BadInputError: the pattern cannot be read.
+    """
+
+    def __init__(
+        self, scenario: Scenario, board: HeldBoard, camera: int, width: int, height: int, rate_hz: float, bits: int = 8
+    ) -> None:
+        self._settings, self._board, self._rate_hz = scenario.cameras[camera], board, rate_hz
+        before = scenario.cameras[scenario.camera_index(board.before)]
+        self._before = before.projection(width, height)
+        self._projection = self._settings.projection(width, height)
+        self._pattern = load_pattern(board.pattern)
+        white = self._pattern.raster()
+        self._raster = np.asarray(np.pad(_BLACK + white * (_WHITE - _BLACK), 1, constant_values=_WALL), np.float32)
+        self._coarse, self._fine = _ideal(self._projection, 1), _ideal(self._projection, _FINE)
+        self._blur = scenario.image.blur_sigma_px * _FINE
+        self._gain, self._black_level = np.float32(self._settings.gain), np.float32(scenario.image.black_level)
+        self._sensor = Sensor(scenario.image, scenario.seed, camera, (height, width), bits)
+        self._drawn: dict[BoardPose, Image] = {}
+
+    def render_into(self, out: Stored, pulse: HillPulse) -> None:
+        """Render the image of hill pulse `pulse` into `out`, shape (height, width); its rows may lie apart."""
+        pose, still = self._board.at(self._settings.middle_s(pulse, self._rate_hz))
+        if still and pose not in self._drawn:
+            blurred = cv2.GaussianBlur(self._seen(pose, self._fine), (0, 0), self._blur)
+            size = self._projection.width, self._projection.height
+            self._drawn[pose] = np.asarray(cv2.resize(blurred, size, interpolation=cv2.INTER_AREA), np.float32)
+        radiance = self._drawn[pose].copy() if still else self._seen(pose, self._coarse)
+        radiance *= self._gain
+        radiance += self._black_level
+        self._sensor.read(radiance, out, pulse)
+
+    def _seen(self, pose: BoardPose, ideal: tuple[Image, Image]) -> Image:
+        """What rays meet, each given by its ideal metric coordinates."""
+        there, camera, cell = placed(pose, self._before), self._projection, self._pattern.cell_mm / _MM_PER_M
+        k = camera.R.T @ np.column_stack((there.axes[:, :2], there.middle - camera.X0))
+        h = np.linalg.inv(k)  # (right, up, 1) on the board, m, up to a factor, from the ray (x, y, -c)
+        x, y = ideal
+        right, up, scale = ((row[0] * x + row[1] * y - np.float32(row[2] * camera.c)) for row in h.astype(np.float32))
+        rows, columns = self._raster.shape
+        # cells count from the raster's upper left corner; OpenCV's places from the middle of the first cell
+        across = right / scale * np.float32(1 / cell) + np.float32(columns / 2 - 0.5)
+        down = up / scale * np.float32(-1 / cell) + np.float32(rows / 2 - 0.5)
+        seen = cv2.remap(
+            self._raster, across, down, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=_WALL
+        )
+        return np.asarray(seen, np.float32)
+
+
+def _ideal(camera: Projection, fine: int) -> tuple[Image, Image]:
+    """Ideal metric coordinates x, y, (rows, columns) each, of a grid with `fine` rays along a pixel's side."""
+    across, down = np.meshgrid(np.arange(-1, camera.width + 1), np.arange(-1, camera.height + 1))
+    wanted = np.stack((across - (camera.width - 1) / 2, (camera.height - 1) / 2 - down), axis=-1)
+    ideal: Floats = wanted.copy()
+    if camera.lens is not None:
+        reach = float(np.hypot(camera.width, camera.height))
+        for _ in range(_STEPS):
+            ideal += wanted - camera.lens.bend(ideal, reach)
+    size = (camera.width + 2) * fine, (camera.height + 2) * fine
+    # the rays of a column are staggered: edges along the pixels would else be shifted by up to half a ray, all alike
+    columns, rows = (np.arange(each) * _GOLDEN % 1.0 - 0.5 for each in size)
+    found = []
+    for each in (ideal[..., 0], ideal[..., 1]):
+        regular = cv2.resize(each, size, interpolation=cv2.INTER_LINEAR)
+        by_row, by_column = np.gradient(regular)
+        staggered = regular + by_column * rows[:, None] + by_row * columns
+        found.append(np.ascontiguousarray(staggered[fine:-fine, fine:-fine], np.float32))
+    return found[0], found[1]

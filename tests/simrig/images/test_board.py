@@ -1,0 +1,75 @@
+"""A board before the cameras: drawn where the projection says, still and moving, and as `svev target` prints it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.targets.detection import Sight, find_targets
+from analysis.targets.pattern import Layout
+from analysis.targets.sheets import board_geometry
+from rig.errors import BadInputError
+from rig.pulse import HillPulse
+from rig.settings.file import CONFIG
+from simrig.images.view import CameraView
+from simrig.world.board import load_pattern, placed
+from simrig.world.scenario import Scenario, load_scenario
+
+RATE_HZ = 10.0
+_FILE = CONFIG / "scenarios" / "calibration.toml"
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    return load_scenario(_FILE)
+
+
+def _sight(view: CameraView, time_s: float) -> Sight:
+    out = np.zeros((480, 640), np.uint8)
+    view.render_into(out, HillPulse(round(time_s * RATE_HZ)))
+    return find_targets(out, Layout(), "drawn")
+
+
+def test_corners_are_where_the_projection_shows_them(scenario: Scenario) -> None:
+    """Errors have the size of their sigmas; a shift by a cell's edge would be ten of them."""
+    assert scenario.board is not None
+    view = CameraView(scenario, 2, 640, 480, RATE_HZ)
+    before, camera = (scenario.cameras[i].projection(640, 480) for i in (1, 2))
+    for number in (0, 4, 7):
+        sight = _sight(view, 4.0 * number + 1.0)
+        board = placed(scenario.board.poses[number], before)
+        off = []
+        for name, corner in sight.corners.items():
+            place = Layout().board_place(name)
+            assert place is not None
+            right, up = (place[:2] + np.array([-135.0, 90.0])) / 1000.0  # from the middle of 9 x 6 squares of 30 mm
+            x, y = camera.pixels(board.middle + right * board.axes[:, 0] + up * board.axes[:, 1])
+            off += [(corner.x - x) / corner.sigma_x, (corner.y - y) / corner.sigma_y]
+        assert len(off) > 50
+        assert np.sqrt(np.mean(np.square(off))) < 1.5
+
+
+def test_it_is_still_and_then_moves_to_the_next_pose(scenario: Scenario) -> None:
+    assert scenario.board is not None
+    (first, still), (same, _), (other, moving) = (scenario.board.at(t) for t in (0.5, 2.5, 3.5))
+    assert (first, still, same, moving) == (scenario.board.poses[0], True, scenario.board.poses[0], False)
+    assert first.turn_deg < other.turn_deg < scenario.board.poses[1].turn_deg
+    assert scenario.board.at(4.0 * len(scenario.board.poses) + 0.5) == (first, True)
+
+
+def test_the_shipped_pattern_is_the_one_that_svev_target_prints() -> None:
+    shipped = json.loads((CONFIG / "scenarios" / "board.json").read_text())
+    assert shipped == json.loads(json.dumps(board_geometry(Layout())))
+
+
+def test_another_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "board.json").write_text('{"board": {"width_mm": 1}}')
+    with pytest.raises(BadInputError, match=r"is no board\.json of svev target"):
+        load_pattern(tmp_path / "board.json")
+    with pytest.raises(BadInputError, match="cannot be read"):
+        load_pattern(tmp_path / "none.json")
+    text = _FILE.read_text().replace('before = "K2"', 'before = "K9"')
+    (tmp_path / "scenario.toml").write_text(text)
+    with pytest.raises(BadInputError, match="no such camera; name one of K1, K2, K3"):
+        load_scenario(tmp_path / "scenario.toml")

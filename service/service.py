@@ -34,6 +34,7 @@ from rig.transport.preview import PreviewImage, PreviewSlot
 from service.aids import aids_of, close_up_of, shown_as
 from service.aiming.balls import BallPlaces
 from service.automatic.marks import Marks
+from service.calibrating.helper import CalibrationHelper
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.lights import Lights
@@ -74,6 +75,7 @@ class Service(Archive):
         lights: exposure, gain and region of the cameras.
         trains: the pulses, where svev makes them.
         balls: where the cameras should show the balls.
+        calibrating: helps to calibrate the cameras.
         examine: the doctor; examines what disturbs nothing in the given state. It is told whether the beam of the light
             barrier is interrupted; None: it is not known.
     """
@@ -91,12 +93,13 @@ class Service(Archive):
         lights: Lights,
         trains: Trains,
         balls: BallPlaces,
+        calibrating: CalibrationHelper,
         examine: Callable[[Status, bool | None], DoctorReport],
     ) -> None:
         super().__init__(catalogue, exports, measurings)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
         self._slot, self._rehearser, self._examine = slot, rehearser, examine
-        self._lights, self._trains, self._balls = lights, trains, balls
+        self._lights, self._trains, self._balls, self._calibrating = lights, trains, balls, calibrating
         #: Whoever needs the cameras while the rig is idle holds `_idle` until he has them; `_examining`: as long as.
         self._idle, self._examining = threading.Lock(), threading.Lock()
         self._marks = Marks(supervisor, slot, self.status, self.start_recording)
@@ -262,6 +265,11 @@ class Service(Archive):
         if self._rehearser.progress is not None:
             raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change their settings")
         return self._lights.change(camera, change)
+
+    @property
+    def calibrating(self) -> CalibrationHelper:
+        """Helps to calibrate the cameras."""
+        return self._calibrating
 
     def trigger(self) -> TriggerView:
         """Who makes the pulses, and at what rate."""

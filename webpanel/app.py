@@ -25,6 +25,7 @@ from webpanel.door.streams import OpenStreams
 from webpanel.problems import handle_errors
 from webpanel.routes.alarms import alarms_router
 from webpanel.routes.athletes import athletes_router
+from webpanel.routes.calibrating import calibrating_router
 from webpanel.routes.common import COMMON
 from webpanel.routes.contents import contents_router
 from webpanel.routes.digitizing import digitizing_router
@@ -96,6 +97,7 @@ def create_app(
         digitizing_router(desks or Desks(_nothing_to_measure, lambda: None), streams.events),
         preview_router(service, streams),
         cameras_router(service, streams),
+        calibrating_router(service),
         events_router(service, changes, streams.events),
         login_router(door, service.tell),
         links_router(door, service),

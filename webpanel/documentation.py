@@ -33,6 +33,7 @@ _TAGS: Final = {
     "Rig": "The rig as a whole: its state, arming, the rig file, the doctor, rehearsals.",
     "Recordings": "Starting and stopping, and what was recorded: list, session fields, pictures, files, the trash.",
     "Jumpers": "The start list and the next jumper, whom every recording takes at its start.",
+    "Calibration": "Pictures of a printed target, and the calibration of the cameras that comes of them.",
     "Exports": "Videos, pictures and tables of recordings, made by the service beside its work.",
     "Athletes": "The measured jumps of all recordings, by athlete and day.",
     "Measurements": "What was measured in a recording, by itself after its end: figures, files, progress.",

@@ -33,7 +33,7 @@ def to_json(made: PictureCalibration) -> dict[str, Any]:
                 "pictures": verdict.pictures,
                 "lens_px": verdict.lens_px,
                 "words": verdict.words,
-                "advice": list(verdict.advice),
+                "advice": [advice.text for advice in verdict.advice],
             }
             for verdict in made.verdicts
         },

@@ -9,11 +9,12 @@ import numpy as np
 
 from analysis.targets.network_of import Picture
 from analysis.targets.pattern import Layout, target_of
-from analysis.targets.views import PICTURES, any_rolled, covered_cells, empty_parts
+from analysis.targets.views import PICTURES, any_rolled, covered_cells, empty_parts, more_pictures
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.camera_model import Lens, linearise, undistort
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import Phrase, phrase
 
 #: What measuring jumps asks for (paper, section 4): 20 mm in the 20 m that a picture is wide.
 WANTED: Final = 1000.0
@@ -42,7 +43,7 @@ class CameraVerdict:
             turn of the camera takes up.
         one_to: width of the picture over `lens_px`.
         good: whether it is good enough for 1:1000.
-        words: the verdict in a sentence.
+        said: the verdict in a sentence.
         advice: which pictures would make it better, a sentence each.
     """
 
@@ -51,8 +52,13 @@ class CameraVerdict:
     lens_px: float
     one_to: float
     good: bool
-    words: str
-    advice: tuple[str, ...]
+    said: Phrase
+    advice: tuple[Phrase, ...]
+
+    @property
+    def words(self) -> str:
+        """The verdict in English."""
+        return self.said.text
 
 
 def require_poses(pictures: Sequence[Picture], rotations: Floats, positions: Floats) -> None:
@@ -103,11 +109,31 @@ def _verdict(a: Adjustment, camera: int, pictures: Sequence[Picture]) -> CameraV
     lens = float(np.sqrt(np.mean(lens_sigmas(a, camera, size)[1] ** 2)))
     one_to = size[0] / lens if lens > 0.0 else np.inf
     good = one_to * _SHARE >= WANTED
-    words = (
-        f"camera {name}: {'good enough' if good else 'NOT good enough'} for 1:{WANTED:.0f}: the lens is known to "
-        f"{lens:.2g} px (1:{_rounded(one_to):.0f} of the picture's width; 1:{WANTED / _SHARE:.0f} is needed)"
+    return CameraVerdict(
+        name,
+        len(pictures),
+        lens,
+        one_to,
+        good,
+        _said(name, lens, one_to, good=good),
+        tuple(_advice(a, camera, pictures)),
     )
-    return CameraVerdict(name, len(pictures), lens, one_to, good, words, tuple(_advice(a, camera, pictures)))
+
+
+def _said(name: str, lens: float, one_to: float, *, good: bool) -> Phrase:
+    wanted, needed, known = round(WANTED), round(WANTED / _SHARE), round(_rounded(one_to))
+    lens_px = float(f"{lens:.2g}")
+    if good:
+        text = (
+            "camera {camera}: good enough for 1:{wanted}: the lens is known to {lens_px:g} px (1:{one_to} of the "
+            "picture's width; 1:{needed} is needed)"
+        )
+        return phrase("target_good", text, camera=name, wanted=wanted, lens_px=lens_px, one_to=known, needed=needed)
+    text = (
+        "camera {camera}: NOT good enough for 1:{wanted}: the lens is known to {lens_px:g} px (1:{one_to} of the "
+        "picture's width; 1:{needed} is needed)"
+    )
+    return phrase("target_not_good", text, camera=name, wanted=wanted, lens_px=lens_px, one_to=known, needed=needed)
 
 
 def _rounded(value: float) -> float:
@@ -148,36 +174,43 @@ def lens_sigmas(a: Adjustment, camera: int, size: tuple[int, int]) -> tuple[Floa
     return places, np.sqrt(np.maximum(variance, 0.0).reshape(-1, 2).mean(axis=1))
 
 
-def _advice(a: Adjustment, camera: int, pictures: Sequence[Picture]) -> Iterator[str]:
+def _advice(a: Adjustment, camera: int, pictures: Sequence[Picture]) -> Iterator[Phrase]:
     if len(pictures) < PICTURES:
-        yield f"take more pictures: {len(pictures)} of {PICTURES} to 15"
+        yield more_pictures(len(pictures))
     covered, empty = empty_parts(covered_cells([picture.sight for picture in pictures]))
     if empty:
-        yield f"fill the picture: targets cover {covered:.0%} of it; show them in its {', '.join(empty)} part"
+        text = "fill the picture: targets cover {percent}% of it; show them in its {parts} part"
+        yield phrase("target_parts", text, percent=round(100 * covered), parts=", ".join(empty))
     mine = [k for k, image in enumerate(a.network.images) if image.camera == camera]
     rotations = a.state.rotation[mine]
     pairs = list(combinations(range(len(mine)), 2))
     aside = max((_between(rotations[i][:, 2], rotations[j][:, 2]) for i, j in pairs), default=0.0)
     if aside < _ASIDE_DEG:
-        yield (
-            f"take pictures from more to the side, also from above and below: the views differ by {aside:.0f} degrees "
-            f"at most, {_ASIDE_DEG:.0f} to 60 are good"
+        text = (
+            "take pictures from more to the side, also from above and below: the views differ by {aside} degrees "
+            "at most, {least} to 60 are good"
         )
+        yield phrase("target_aside", text, aside=round(aside), least=round(_ASIDE_DEG))
     if not any_rolled(rotations):
-        yield "turn the camera by 90 degrees for two more pictures: principal point and pose are not apart"
+        text = "turn the camera by 90 degrees for two more pictures: principal point and pose are not apart"
+        yield phrase("target_turn_camera", text)
     usual = float(np.median([picture.sight.blur for picture in pictures]))
     if usual > _UNSHARP_PX:
-        yield f"focus the lens: edges are {usual:.1f} px wide in all pictures"
+        text = "focus the lens: edges are {width} px wide in all pictures"
+        yield phrase("target_unsharp", text, width=round(usual, 1))
     for picture in pictures:
         if picture.sight.blur > _BLURRED * usual:
-            yield f"take {picture.name} again: blurred (edges {picture.sight.blur:.1f} px wide, usual {usual:.1f})"
+            text = "take {picture} again: blurred (edges {width} px wide, usual {usual})"
+            width, wide = round(picture.sight.blur, 1), round(usual, 1)
+            yield phrase("target_blurred", text, picture=picture.name, width=width, usual=wide)
     residuals = a.image_residuals()[a.problem.camera == camera]
     rms = float(np.sqrt(np.mean(residuals**2)))
     if rms > _RESIDUAL_PX:
-        yield (
-            f"corners are off by {rms:.1f} px (rms), which is more than measuring errors: let nothing move during an "
+        text = (
+            "corners are off by {rms} px (rms), which is more than measuring errors: let nothing move during an "
             "exposure, and use a rigid target and a global shutter"
         )
+        yield phrase("target_residuals", text, rms=round(rms, 1))
 
 
 def _between(one: Floats, other: Floats) -> float:

@@ -50,7 +50,7 @@ def views(sights: Sequence[Sight], layout: Layout) -> Views:
         layout: what was printed.
     """
     if not sights:
-        return Views(0, np.zeros(_CELLS[::-1], np.intp), (_more(0),))
+        return Views(0, np.zeros(_CELLS[::-1], np.intp), (more_pictures(0),))
     cells = covered_cells(sights)
     poses = list(start_values([("", sight) for sight in sights], layout).poses.values())
     rotations, positions = (np.array([pose[i] for pose in poses]) for i in (1, 0))
@@ -61,11 +61,12 @@ def views(sights: Sequence[Sight], layout: Layout) -> Views:
         text = "show the target where it was not yet: {percent} % of the picture are covered, {wanted} % are needed"
         missing.append(phrase("target_fill", text, percent=round(100 * covered), wanted=round(100 * _COVERED)))
     if len(sights) < PICTURES:
-        missing.append(_more(len(sights)))
+        missing.append(more_pictures(len(sights)))
     return Views(len(sights), cells, tuple(missing))
 
 
-def _more(count: int) -> Phrase:
+def more_pictures(count: int) -> Phrase:
+    """Says that there are too few pictures."""
     text = "take more pictures: {count} of {wanted} to 15"
     return phrase("target_more", text, count=count, wanted=PICTURES)
 

@@ -4,7 +4,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from select import select
 from typing import Any, Final
 
@@ -23,6 +23,7 @@ def run_child(
     tell: Callable[[dict[str, Any]], None],
     hold: Callable[[bool], None],
     yielding: bool = True,
+    inherited: Sequence[int] = (),
 ) -> dict[str, Any] | None:
     """Run a program to its end.
 
@@ -34,6 +35,7 @@ def run_child(
         tell: takes what it says of how far it is.
         hold: called with True when it has to stand still from now on, with False when it goes on.
         yielding: whether it takes only the processor time that nobody else wants; False where nothing is recorded.
+        inherited: descriptors that it has too, by the same numbers.
 
     Returns:
         What it said at its end; None if it was ended because nobody wants it any more.
@@ -42,7 +44,7 @@ def run_child(
         OSError: it cannot be started, or has ended by itself.
     """
     command = [sys.executable, "-m", module, *([] if yielding else [AT_ONCE])]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=inherited) as child:
         try:
             _write(child, json.dumps(asked))
             return _followed(child, busy, wanted, tell, hold)

@@ -102,6 +102,10 @@ class RecordingControl:
         """Take other settings and attach another text of the rig file to the logs from now on."""
         self._rig, self._rig_toml = rig, rig_toml
 
+    def calibrate(self, calibration: Calibration | None) -> None:
+        """Write another calibration into the logs from now on."""
+        self._calibration = calibration
+
     @property
     def opening(self) -> bool:
         """Whether a log is being opened: the recording is ordered, and the state is not yet that of recording."""

@@ -13,6 +13,7 @@ from rig.api.status import ArmOrder, DoctorReport, Event, RigView, Status
 from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
 from rig.phrase import Phrase
 from service.seam.archive import Archive
+from service.seam.calibrating import CalibrationHelper
 from service.seam.cameras import Cameras
 from service.seam.exports import Exports
 from service.seam.start_list import Jumpers
@@ -86,6 +87,11 @@ class RigService(Archive, Cameras, Protocol):
 
     def start_export(self, recording_id: str, order: ExportOrder) -> ExportJob:
         """Ask for an export. StateForbidsError: the recording is still being written; StorageError: no room."""
+        ...
+
+    @property
+    def calibrating(self) -> CalibrationHelper:
+        """Helps to calibrate the cameras."""
         ...
 
     def trigger(self) -> TriggerView:

@@ -67,6 +67,21 @@ FORBIDDEN: Final[dict[tuple[str, State], Phrase]] = {
     ("region", State.FAULT): phrase(
         "forbidden_region_fault", "the rig is being tried again: wait a moment, then change the region"
     ),
+    ("calibrate", State.ARMING): phrase(
+        "forbidden_calibrate_arming", "the rig is being armed: wait until it is armed, then use the calibration"
+    ),
+    ("calibrate", State.ARMED): phrase(
+        "forbidden_calibrate_armed", "a recording is about to start: stop it, then use the calibration"
+    ),
+    ("calibrate", State.RECORDING): phrase(
+        "forbidden_calibrate_recording", "a recording is running: stop it, then use the calibration"
+    ),
+    ("calibrate", State.DISARMING): phrase(
+        "forbidden_calibrate_disarming", "the rig is being disarmed: wait until that is done, then use the calibration"
+    ),
+    ("calibrate", State.FAULT): phrase(
+        "forbidden_calibrate_fault", "the rig is being tried again: wait a moment, then use the calibration"
+    ),
     ("pulses", State.IDLE): phrase(
         "forbidden_pulses_idle", "the rig is not armed: arm it, then stop or ask for pulses"
     ),

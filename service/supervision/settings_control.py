@@ -13,6 +13,7 @@ from rig.phrase import Phrase, phrase
 from rig.settings.light import camera_of
 from rig.settings.model import RigSettings
 from rig.settings.region import named
+from rig.transport.recorder_commands import Calibration
 from service.processes.rig_processes import RigProcesses
 from service.recordings.control import RecordingControl
 from service.status.forbidden import FORBIDDEN
@@ -86,6 +87,12 @@ class SettingsControl:
             raise StateForbidsError(FORBIDDEN["expose", self._machine.state])
         self._use(new)
         self._session.change_camera(name)
+
+    def change_calibration(self, new: RigInUse, calibration: Calibration | None) -> None:
+        """Command: use a rig with another calibration, which the logs have from now on."""
+        self._check("calibrate")
+        self._use(new)
+        self._recordings.calibrate(calibration)
 
     def change_rate(self, new: RigInUse) -> None:
         """Command: use a rig with another rate of its pulses; if it is armed, or has a fault, it is armed anew."""

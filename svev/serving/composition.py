@@ -34,6 +34,8 @@ from rig.transport.recorder_commands import RecorderOptions
 from service.aiming.balls import BallPlaces
 from service.alarms.messenger import Messenger
 from service.alarms.occasions import Occasions
+from service.calibrating.helper import CalibrationHelper
+from service.calibrating.saving import CalibrationKeeper
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.jumpers.keeper import Keeper
@@ -132,7 +134,9 @@ def serve(settings: ServiceSettings) -> None:
         balls = BallPlaces(lambda: supervisor.rig, data)
         service = Service(
             supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor)), keeper, slot,
-            rehearser, lights, trains, balls, PanelDoctor(lambda: supervisor.rig, data).report,
+            rehearser, lights, trains, balls,
+            stack.enter_context(closing(_calibrating(settings.rig, data, supervisor, slot))),
+            PanelDoctor(lambda: supervisor.rig, data).report,
         )  # fmt: skip
         server = make_server(
             create_app(
@@ -194,6 +198,15 @@ def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:
         return supervisor.status.recording is not None
 
     return Exports(data, busy, lambda: usable_bytes(rig, free_bytes(data) or 0))
+
+
+def _calibrating(rig_file: Path, data: Path, supervisor: Supervisor, slot: PreviewSlot) -> CalibrationHelper:
+    """Helps to calibrate the cameras with what the recorder leaves for people to look at."""
+
+    def busy() -> bool:
+        return supervisor.status.recording is not None
+
+    return CalibrationHelper(data, lambda: supervisor.rig, slot.fd, busy, CalibrationKeeper(supervisor, rig_file))
 
 
 def _measurings(data: Path, supervisor: Supervisor) -> Measurings:

@@ -63,6 +63,7 @@ from service.supervision.tap_guard import check_seen, check_stop, tap_guard
 from svev.doctor.finding import Topic, passed, warning
 from tests.recorder.logs import ALL_OK, PERIOD_NS, RIG, RIG_TOML, make_tag, write_pulse
 from tests.support.rigs import SIM
+from tests.webpanel.memory_calibrating import MemoryCalibrating
 
 SHAPE = (120, 480)
 COLUMNS = ((0, 160), (160, 320), (320, 480))
@@ -92,6 +93,7 @@ class MemoryService(Archive):
         lights: exposure, gain and region of each camera.
         pulses_made: who makes the pulses.
         bursts: pulses that were asked for.
+        calibrating: what the calibration helper shows, set by tests.
         balls: where each camera should show the balls, set by tests.
         preview_calls: how often somebody asked for a picture.
         settings: the rig file, whose `[analysis]` tests set.
@@ -120,6 +122,7 @@ class MemoryService(Archive):
             source="gpio", rate_hz=30, controls=tuple(TriggerControl), running=True, saved=True
         )
         self.bursts: list[int] = []
+        self.calibrating = MemoryCalibrating()
         limits = RegionLimits(
             width=320, height=240, step_x=4, step_y=2, least_width=16, least_height=2, step_width=8, step_height=2
         )

@@ -50,6 +50,17 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
         r"PATCH /api/cameras/([^/]+)",
         lambda camera: phrase("act_light", "changed exposure, gain or region of {camera}", camera=camera),
     ),
+    (r"POST /api/calibration", lambda: phrase("act_calibrating", "began to take pictures of a target")),
+    (r"DELETE /api/calibration", lambda: phrase("act_calibrating_ended", "ended the calibration helper")),
+    (
+        r"DELETE /api/calibration/pictures/last",
+        lambda: phrase("act_calibrating_undone", "took back the last picture of a target"),
+    ),
+    (r"POST /api/calibration/compute", lambda: phrase("act_calibrated", "asked for a calibration to be computed")),
+    (
+        r"POST /api/calibration/save",
+        lambda: phrase("act_calibration_saved", "put the calibration into the rig file"),
+    ),
     (r"PATCH /api/trigger", lambda: phrase("act_trigger", "changed the pulses")),
     (r"POST /api/trigger/burst", lambda: phrase("act_burst", "asked for pulses")),
     (r"PUT /api/automatic", lambda: phrase("act_automatic", "changed whether recordings begin by themselves")),

@@ -143,7 +143,7 @@ def test_pictures_that_all_look_alike_are_not_good_enough_and_it_says_what_to_do
     (verdict,) = _calibrated(_pictures(poses, lambda _: places, sigma=0.05)).verdicts
     assert not verdict.good
     assert "NOT good enough for 1:1000" in verdict.words
-    advice = " / ".join(verdict.advice)
+    advice = " / ".join(map(str, verdict.advice))
     for words in (
         "take more pictures: 6 of 9",
         "fill the picture: targets cover",
@@ -158,7 +158,7 @@ def test_blurred_pictures_are_named() -> None:
     pictures = _pictures(_stations(), lambda _: places)
     pictures[3] = replace(pictures[3], sight=replace(pictures[3].sight, blur=2.4))
     (verdict,) = _calibrated(pictures).verdicts
-    assert verdict.advice == ("take K1/3 again: blurred (edges 2.4 px wide, usual 0.8)",)
+    assert tuple(map(str, verdict.advice)) == ("take K1/3 again: blurred (edges 2.4 px wide, usual 0.8)",)
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "1 picture shows"), (2, "2 pictures show")])

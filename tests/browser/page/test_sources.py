@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from rig.api import (
     athletes,
+    calibrating,
     comparison,
     digitizing,
     jump,
@@ -52,6 +53,7 @@ COMPOSED = (
     "curves.",
     "measured.",
     "spans.q_",
+    "calibrating.",
 )
 #: Ends of the names of the modules that hold words: "", "-check" and so on.
 PARTS = sorted(path.stem.removeprefix("en") for path in (PAGE / "i18n").glob("en*.js"))
@@ -198,7 +200,14 @@ def test_findings_events_and_reasons_are_said_in_norwegian_too_with_the_values_t
     assert len(heard) > 150
     listed = [
         _listed(name)
-        for name in ("nb-findings.js", "nb-events.js", "nb-analysis.js", "nb-refusals.js", "nb-digitizing.js")
+        for name in (
+            "nb-findings.js",
+            "nb-events.js",
+            "nb-analysis.js",
+            "nb-refusals.js",
+            "nb-digitizing.js",
+            "nb-targets.js",
+        )
     ]
     assert set().union(*listed) == heard
 
@@ -227,6 +236,7 @@ def test_the_shapes_are_those_of_the_api(name: str) -> None:
     rooms = (
         digitizing,
         athletes,
+        calibrating,
         comparison,
         aids,
         balls,

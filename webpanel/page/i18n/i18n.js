@@ -8,6 +8,7 @@ import { events as nbEvents } from "./nb-events.js";
 import { findings as nbFindings } from "./nb-findings.js";
 import { refusals as nbRefusals } from "./nb-refusals.js";
 import { statements as nbStatements } from "./nb-statements.js";
+import { targets as nbTargets } from "./nb-targets.js";
 import { nb } from "./nb.js";
 
 /** @typedef {import("../shared/types.js").Statement} Statement */
@@ -15,7 +16,7 @@ import { nb } from "./nb.js";
 
 const LANGUAGES = { en, nb };
 /** @type {Record<string, Record<string, [string, string?]>>} text and advice by code */
-const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis, ...nbRefusals, ...nbDigitizing } };
+const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis, ...nbRefusals, ...nbDigitizing, ...nbTargets } };
 
 /** @type {"en"|"nb"} */
 let language = "en";

@@ -140,4 +140,5 @@ export const statements = {
   page_stream_broken: ["direkte nytt kommer ikke fram: siden spør hvert annet sekund"],
   page_timeout: ["ikke noe svar i tide: se om det skjedde likevel, og prøv igjen"],
   page_strange: ["tjenesten svarer noe uventet: se i loggen dens"],
+  target_mirrored: ["bildet viser målet speilvendt", "slå av speiling i kameraet"],
 };

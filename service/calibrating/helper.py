@@ -1,0 +1,347 @@
+"""The calibration helper: has pictures of a target taken while somebody moves it, then a calibration computed.
+
+Both is done by programs that leave recorder and grabbers the processor, one at a time, and stand still while a
+recording runs; the computing takes only what time nobody else wants. The helper ends when nobody has looked at it for a
+while; the pictures stay.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+from rig.api.calibrating import CalibratedLens, Calibrating, CalibratingOrder, CalibratingState, SeenTarget
+from rig.api.statement import Level, Statement
+from rig.background.child import run_child
+from rig.errors import StateForbidsError, StorageError
+from rig.phrase import Phrase, as_plain, from_plain, phrase
+from rig.settings.camera import Region
+from rig.settings.model import RigSettings
+from service.calibrating.folder import CALIBRATIONS, MOST, PICTURES, RESULT, numbers, remove_last
+
+#: Without anybody who looks at it, the helper ends after so long a time.
+_LEASE_S: Final = 60.0
+_END_S: Final = 5.0
+_FINDING: Final = "service.calibrating.finding"
+_COMPUTING: Final = "service.calibrating.computing"
+_MIRRORED: Final = Statement(
+    level=Level.WARNING,
+    code="target_mirrored",
+    text="the picture shows the target in a mirror",
+    advice="turn off the mirror or flip of the camera",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Set:
+    """The pictures that belong together.
+
+    Attributes:
+        folder: in which they are, and what is computed from them.
+        order: what was printed.
+        regions: of the cameras, by name: pictures of others are of another size.
+    """
+
+    folder: Path
+    order: CalibratingOrder
+    regions: dict[str, Region]
+
+    @property
+    def pictures(self) -> Path:
+        """The folder of the pictures."""
+        return self.folder / PICTURES
+
+    @property
+    def layout(self) -> dict[str, float]:
+        """As `analysis.targets.pattern.Layout` takes it."""
+        order = self.order
+        return {
+            "columns": order.columns, "rows": order.rows, "board_mm": order.square_mm, "single_mm": order.target_mm,
+        }  # fmt: skip
+
+
+class CalibrationHelper:
+    """Any thread may call any method.
+
+    Args:
+        directory: folder of the recordings.
+        rig: gives the rig in use.
+        live: descriptor of the memory with the newest triplet.
+        busy: whether a recording runs.
+        keep: puts a result file into rig file and logs.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        rig: Callable[[], RigSettings],
+        live: int,
+        busy: Callable[[], bool],
+        keep: Callable[[Path], None],
+    ) -> None:
+        self._directory, self._rig, self._live, self._busy, self._keep = directory, rig, live, busy, keep
+        self._lock, self._commands = threading.Lock(), threading.RLock()
+        self._state, self._held = CalibratingState.OFF, False
+        self._set: _Set | None = None
+        self._news: dict[str, Any] = {}
+        self._problem: Statement | None = None
+        self._lenses: tuple[CalibratedLens, ...] = ()
+        self._saved = False
+        self._worker: threading.Thread | None = None
+        self._unwanted = threading.Event()
+        self._looked = 0.0
+
+    def view(self) -> Calibrating:
+        """What the helper does and has; who asks keeps it going."""
+        with self._lock:
+            self._looked = time.monotonic()
+            working = self._state in {CalibratingState.LOOKING, CalibratingState.COMPUTING}
+            taken = [] if self._set is None else numbers(self._set.pictures)
+            return Calibrating(
+                state=CalibratingState.HELD if working and self._held else self._state,
+                still=self._state is CalibratingState.LOOKING and bool(self._news.get("still")),
+                full=len(taken) >= MOST,
+                folder=None if self._set is None else str(self._set.pictures),
+                taken=len(taken),
+                cameras=self._seen(),
+                problem=self._problem,
+                lenses=self._lenses,
+                saved=self._saved,
+            )
+
+    def begin(self, order: CalibratingOrder) -> Calibrating:
+        """Look at live pictures and keep those that are wanted; pictures that are there go on, unless `anew`.
+
+        Raises:
+            StorageError: no folder can be made for them.
+        """
+        with self._commands:
+            regions = {camera.name: camera.region for camera in self._rig().cameras}
+            known = self._set
+            printed = order.model_copy(update={"anew": False})
+            if known is not None and (known.order, known.regions) == (printed, regions):
+                if self._state is CalibratingState.LOOKING and not order.anew:
+                    return self.view()
+            else:
+                known = None
+            self._end()
+            with self._lock:
+                if known is None or order.anew or self._saved:
+                    known, self._news = _Set(self._new_folder(), printed, regions), {}
+                self._set, self._problem, self._lenses, self._saved = known, None, (), False
+            self._start(CalibratingState.LOOKING, self._find)
+            return self.view()
+
+    def end(self) -> Calibrating:
+        """Look no more, or give up computing; the pictures stay."""
+        with self._commands:
+            self._end()
+            return self.view()
+
+    def undo(self) -> Calibrating:
+        """Remove the pictures that were kept last.
+
+        Raises:
+            StateForbidsError: there are none, or a calibration is being computed from them.
+            StorageError: the disk refuses.
+        """
+        with self._commands:
+            if self._state is CalibratingState.COMPUTING:
+                raise StateForbidsError(
+                    "a calibration is being computed: wait until it is done, then take pictures away"
+                )
+            try:
+                if self._set is None or not remove_last(self._set.pictures):
+                    raise StateForbidsError(
+                        "there is no picture to take away: hold the target still before the cameras"
+                    )
+            except OSError as error:
+                raise StorageError(f"the picture cannot be removed ({error.strerror}): look at the disk") from error
+            with self._lock:
+                if self._state in {CalibratingState.DONE, CalibratingState.FAILED}:
+                    self._state, self._problem, self._lenses = CalibratingState.OFF, None, ()
+            return self.view()
+
+    def compute(self) -> Calibrating:
+        """Compute a calibration from the pictures.
+
+        Raises:
+            StateForbidsError: there are no pictures.
+        """
+        with self._commands:
+            if self._state is CalibratingState.COMPUTING:
+                return self.view()
+            if self._set is None or not numbers(self._set.pictures):
+                raise StateForbidsError(
+                    "there are no pictures to compute from: hold the target before the cameras first"
+                )
+            self._end()
+            with self._lock:
+                self._problem, self._lenses, self._saved = None, (), False
+            self._start(CalibratingState.COMPUTING, self._compute)
+            return self.view()
+
+    def save(self) -> Calibrating:
+        """Put the calibration into the rig file, and into all logs from now on.
+
+        Raises:
+            StateForbidsError: none is computed, or a recording runs.
+            BadInputError: a camera has none.
+            StorageError: the rig file cannot be written.
+        """
+        with self._commands:
+            if self._state is not CalibratingState.DONE or self._set is None:
+                raise StateForbidsError("there is no calibration yet: compute it, then put it into the rig file")
+            self._keep(self._set.folder / RESULT)
+            with self._lock:
+                self._saved = True
+            return self.view()
+
+    def protocol(self) -> Path:
+        """The protocol of the calibration.
+
+        Raises:
+            StateForbidsError: none is computed.
+        """
+        if self._state is not CalibratingState.DONE or self._set is None:
+            raise StateForbidsError("there is no protocol yet: compute the calibration first")
+        return self._set.folder / "protocol.html"
+
+    def close(self) -> None:
+        """End what runs."""
+        with self._commands:
+            self._end()
+
+    def _seen(self) -> tuple[SeenTarget, ...]:
+        if self._set is None:
+            return ()
+        cameras: dict[str, Any] = self._news.get("cameras", {})
+        return tuple(
+            SeenTarget(
+                camera=name,
+                width=region.width,
+                height=region.height,
+                corners=said["corners"] if self._state is CalibratingState.LOOKING else (),
+                pictures=said["pictures"],
+                cells=said["cells"],
+                missing=tuple(_stated(from_plain(each)) for each in said["missing"]),
+            )
+            if (said := cameras.get(name)) is not None
+            else SeenTarget(camera=name, width=region.width, height=region.height)
+            for name, region in self._set.regions.items()
+        )
+
+    def _new_folder(self) -> Path:
+        name = f"{datetime.now(UTC):%Y%m%d-%H%M%S}"
+        folder, number = self._directory / CALIBRATIONS / name, 1
+        while folder.exists():
+            number += 1
+            folder = folder.with_name(f"{name}-{number}")
+        try:
+            (folder / PICTURES).mkdir(parents=True)
+        except OSError as error:
+            raise StorageError(f"{folder}: cannot be made ({error.strerror}); look at the disk") from error
+        return folder
+
+    def _start(self, state: CalibratingState, work: Callable[[_Set], None]) -> None:
+        if self._set is None:
+            raise TypeError("there is no set of pictures")
+        self._unwanted.clear()
+        with self._lock:
+            self._state, self._held, self._looked = state, False, time.monotonic()
+        self._worker = threading.Thread(target=work, args=(self._set,), name="calibrating", daemon=True)
+        self._worker.start()
+
+    def _end(self) -> None:
+        self._unwanted.set()
+        if self._worker is not None:
+            self._worker.join(_END_S)
+            self._worker = None
+        with self._lock:
+            if self._state in {CalibratingState.LOOKING, CalibratingState.COMPUTING}:
+                self._state = CalibratingState.OFF
+
+    def _find(self, pictures: _Set) -> None:
+        rig = self._rig()
+
+        def wanted() -> bool:
+            looked_at = time.monotonic() - self._looked < _LEASE_S
+            now = {camera.name: camera.region for camera in self._rig().cameras}
+            return looked_at and now == pictures.regions and not self._unwanted.is_set()
+
+        asked = {
+            "fd": self._live,
+            "rig": rig.model_dump(mode="json", exclude_unset=True),
+            "folder": str(pictures.pictures),
+            "layout": pictures.layout,
+        }
+        end = self._run(_FINDING, asked, wanted, inherited=(self._live,), yielding=False)
+        self._conclude(CalibratingState.OFF, CalibratingState.LOOKING, end)
+
+    def _compute(self, pictures: _Set) -> None:
+        asked = {"folder": str(pictures.folder), "layout": pictures.layout}
+        end = self._run(_COMPUTING, asked, lambda: not self._unwanted.is_set())
+        if end is not None and "lenses" in end:
+            with self._lock:
+                self._lenses = tuple(_lens(each) for each in end["lenses"])
+        done = CalibratingState.FAILED if end is not None and "problem" in end else CalibratingState.DONE
+        self._conclude(CalibratingState.OFF if end is None else done, CalibratingState.COMPUTING, end)
+
+    def _run(
+        self,
+        module: str,
+        asked: dict[str, Any],
+        wanted: Callable[[], bool],
+        *,
+        inherited: tuple[int, ...] = (),
+        yielding: bool = True,
+    ) -> dict[str, Any] | None:
+        def tell(news: dict[str, Any]) -> None:
+            with self._lock:
+                if news:
+                    self._news = {**self._news, **news}
+                    self._problem = _problem(news)
+
+        def hold(held: bool) -> None:
+            with self._lock:
+                self._held = held
+
+        try:
+            return run_child(
+                module,
+                asked,
+                busy=self._busy,
+                wanted=wanted,
+                tell=tell,
+                hold=hold,
+                yielding=yielding,
+                inherited=inherited,
+            )
+        except OSError as error:
+            why = error.strerror or str(error)
+            said = phrase("why_calibrating_ended", "the program that works on the pictures ended ({why})", why=why)
+            return {"problem": as_plain(said)}
+
+    def _conclude(self, now: CalibratingState, before: CalibratingState, end: dict[str, Any] | None) -> None:
+        with self._lock:
+            if self._state is before:
+                self._state = now
+                self._problem = _problem(end or {})
+
+
+def _problem(said: dict[str, Any]) -> Statement | None:
+    if "problem" in said:
+        return _stated(from_plain(said["problem"])).model_copy(update={"level": Level.ERROR})
+    return _MIRRORED if said.get("mirrored") else None
+
+
+def _stated(said: Phrase) -> Statement:
+    return Statement(code=said.code, text=said.text, values=said.values)
+
+
+def _lens(said: dict[str, Any]) -> CalibratedLens:
+    advice = tuple(_stated(from_plain(each)) for each in said["advice"])
+    return CalibratedLens.model_validate({**said, "verdict": _stated(from_plain(said["verdict"])), "advice": advice})

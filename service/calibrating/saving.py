@@ -1,0 +1,80 @@
+"""Puts a calibration into the rig file, into the rig in use, and so into all logs from now on."""
+
+import json
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from rig.events import Event, Level
+from rig.host.disk import replace_file
+from rig.phrase import Phrase, phrase
+from rig.settings.calibration import with_calibration, written_calibration
+from service.recordings.control import read_calibration
+from service.rig_file import keep
+from service.supervision.commands import at_once
+from service.supervision.settings_control import RigInUse
+from service.supervision.supervisor import Supervisor
+
+_SOON_S: Final = 10.0
+_JOINED: Final = "joined.json"
+
+
+class CalibrationKeeper:
+    """Any thread may call it.
+
+    Args:
+        supervisor: owns the rig.
+        rig_file: in which the calibration is named.
+    """
+
+    def __init__(self, supervisor: Supervisor, rig_file: Path) -> None:
+        self._supervisor, self._file = supervisor, rig_file
+
+    def __call__(self, result: Path) -> None:
+        """Use a calibration from now on, also after a restart. Cameras that it lacks keep the one they had.
+
+        Args:
+            result: the result file.
+
+        Raises:
+            BadInputError: a camera has no calibration, neither in this file nor in the one before; or the rig file has
+                become unreadable.
+            StateForbidsError: a recording runs.
+            StorageError: the rig file cannot be written; the logs have the calibration all the same.
+        """
+        supervisor = self._supervisor
+        with supervisor.changing:
+            cameras = frozenset(json.loads(result.read_bytes())["cameras"])
+            cameras &= {camera.name for camera in supervisor.rig.cameras}
+            file = self._with_others(result, cameras).resolve()
+            rig = with_calibration(supervisor.rig, file, cameras)
+            known = read_calibration(rig)
+            new = RigInUse(rig, written_calibration(supervisor.rig_toml, file, cameras))
+            supervisor.commands.ask(at_once(partial(supervisor.settings.change_calibration, new, known)), _SOON_S)
+            said = phrase("event_calibration", "is {file} from now on", file=str(file))
+            supervisor.hub.tell(Event.now(Level.INFO, "calibration", said))
+
+            def not_kept(why: str) -> Phrase:
+                text = (
+                    '{path}: cannot be written ({why}); write calibration = "{file}" at its top, or a restart of the '
+                    "service loses it"
+                )
+                return phrase("why_calibration_not_kept", text, path=str(self._file), why=why, file=str(file))
+
+            keep(self._file, lambda text: written_calibration(text, file, cameras), not_kept)
+
+    def _with_others(self, result: Path, cameras: frozenset[str]) -> Path:
+        """The result file, or one beside it that has the other cameras of the calibration before, too."""
+        from recorder.merging.calibration_file import Attached, joined_calibration  # noqa: PLC0415 - seldom needed
+
+        before = self._supervisor.rig.calibration
+        others = [camera.name for camera in self._supervisor.rig.cameras if camera.name not in cameras]
+        if before is None or not others:
+            return result
+        parts = (
+            Attached(before.name, others, before.read_bytes()),
+            Attached(result.name, list(cameras), result.read_bytes()),
+        )
+        joined = result.with_name(_JOINED)
+        replace_file(joined, joined_calibration(parts) or b"", links=False)
+        return joined

@@ -20,7 +20,6 @@ _WHITE: Final = 205.0
 _WALL: Final = 110.0
 _FINE: Final = 4  # rays along a pixel's side, while the board is still
 _MM_PER_M: Final = 1000.0
-_GOLDEN: Final = 0.6180339887498949
 _STEPS: Final = 20  # of finding the ideal place that a lens shows at a given one
 
 
@@ -81,10 +80,25 @@ class BoardView:
         # cells count from the raster's upper left corner; OpenCV's places from the middle of the first cell
         across = right / scale * np.float32(1 / cell) + np.float32(columns / 2 - 0.5)
         down = up / scale * np.float32(-1 / cell) + np.float32(rows / 2 - 0.5)
+        fine = len(across) // camera.height
         seen = cv2.remap(
-            self._raster, across, down, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=_WALL
-        )
+            self._raster, _averaged(across, fine), _averaged(down, fine), cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT, borderValue=_WALL,
+        )  # fmt: skip
         return np.asarray(seen, np.float32)
+
+
+def _averaged(places: Image, fine: int) -> Image:
+    """Places at which linear interpolation gives the mean of the cells over what each ray covers.
+
+    Args:
+        places: (rows, columns) in cells, 0 the middle of the first one; a ray covers less than a cell.
+        fine: rays along a pixel's side.
+    """
+    covered = np.hypot(*np.gradient(places[::fine, ::fine])) / fine
+    covered = cv2.resize(covered, places.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    begin = np.floor(places)
+    return np.asarray(begin + np.clip((places - begin - 0.5) / covered + 0.5, 0.0, 1.0), np.float32)
 
 
 def _ideal(camera: Projection, fine: int) -> tuple[Image, Image]:
@@ -97,12 +111,8 @@ def _ideal(camera: Projection, fine: int) -> tuple[Image, Image]:
         for _ in range(_STEPS):
             ideal += wanted - camera.lens.bend(ideal, reach)
     size = (camera.width + 2) * fine, (camera.height + 2) * fine
-    # the rays of a column are staggered: edges along the pixels would else be shifted by up to half a ray, all alike
-    columns, rows = (np.arange(each) * _GOLDEN % 1.0 - 0.5 for each in size)
-    found = []
-    for each in (ideal[..., 0], ideal[..., 1]):
-        regular = cv2.resize(each, size, interpolation=cv2.INTER_LINEAR)
-        by_row, by_column = np.gradient(regular)
-        staggered = regular + by_column * rows[:, None] + by_row * columns
-        found.append(np.ascontiguousarray(staggered[fine:-fine, fine:-fine], np.float32))
-    return found[0], found[1]
+    x, y = (
+        np.ascontiguousarray(cv2.resize(each, size, interpolation=cv2.INTER_LINEAR)[fine:-fine, fine:-fine], np.float32)
+        for each in (ideal[..., 0], ideal[..., 1])
+    )
+    return x, y

@@ -13,7 +13,9 @@ from rig.clocks import NS_PER_S
 from rig.errors import CameraError
 
 #: Features that switch PTP on, and those that say what has become of it.
-_PTP: Final = (("PtpEnable", "PtpStatus"), ("GevIEEE1588", "GevIEEE1588Status"))
+_PTP: Final = (("PtpEnable", "PtpStatus"), ("GevIEEE1588", "GevIEEE1588Status"), ("PtpMode", "PtpStatus"))
+#: Of `PtpMode`: it finds the master by itself, as the switches of the others have it, or follows one.
+_FOLLOWS: Final = ("Auto", "Slave")
 #: Its clock is that of all cameras: it follows the master, or is the master itself.
 _LOCKED: Final = frozenset({"Slave", "Master"})
 #: A camera whose clock is not locked after so long is tried again later.
@@ -21,27 +23,28 @@ _LOCK_S: Final = 3.0
 _LOOK_S: Final = 0.05
 
 
-def set_action_trigger(features: Features, name: str, keys: ActionKeys) -> None:
+def set_action_trigger(features: Features, name: str, keys: ActionKeys, trigger: str) -> None:
     """Have a camera, whose trigger is selected, expose at action commands.
 
     Args:
         features: of the camera.
         name: of the camera.
         keys: of the commands.
+        trigger: the feature by which the source of the trigger is chosen.
 
     Raises:
         CameraError: it has no such trigger, or does not take the keys.
     """
-    sources = features.entries("TriggerSource")
-    source = features.choose("TriggerSource", *sorted(each for each in sources if re.fullmatch(r"Action\d+", each)))
-    if source is None:
+    there = features.entries(trigger)
+    signals = sorted(int(each.removeprefix("Action")) for each in there if re.fullmatch(r"Action\d+", each))
+    # The signal whose keys can be set. With some makers they are those of the only one, whatever number it has.
+    signals.sort(key=lambda signal: not _select(features, signal))
+    if not signals or features.choose(trigger, f"Action{signals[0]}") is None:
         raise CameraError(
-            f"camera {name} has no action trigger (its TriggerSource has {', '.join(sources) or 'none'}): use "
+            f"camera {name} has no action trigger (its {trigger} has {', '.join(there) or 'none'}): use "
             '[trigger] source = "external"'
         )
-    signal = int(source.removeprefix("Action"))
-    if features.has("ActionSelector") and features.set_number("ActionSelector", signal) != signal:
-        raise CameraError(f"camera {name} does not let {source} be set up (ActionSelector): use its newest firmware")
+    _select(features, signals[0])
     for feature, key in (
         ("ActionDeviceKey", keys.device), ("ActionGroupKey", keys.group), ("ActionGroupMask", keys.mask),
     ):  # fmt: skip
@@ -55,6 +58,13 @@ def set_action_trigger(features: Features, name: str, keys: ActionKeys) -> None:
     features.switch("GevGVCPExtendedStatusCodes", on=True)
 
 
+def _select(features: Features, signal: int) -> bool:
+    """Select the action signal whose keys are set from now on; whether the camera lets it be selected."""
+    if features.entries("ActionSelector"):
+        return features.choose("ActionSelector", f"Action{signal}", str(signal)) is not None
+    return features.set_number("ActionSelector", signal) == signal
+
+
 def lock_clock(features: Features, name: str) -> None:
     """Switch PTP on, and wait until the camera's clock is locked.
 
@@ -66,7 +76,7 @@ def lock_clock(features: Features, name: str) -> None:
         CameraError: it has no PTP, or its clock is not locked after some seconds.
     """
     enable, status = next(((enable, status) for enable, status in _PTP if features.has(enable)), ("", ""))
-    if not enable or not features.switch(enable, on=True):
+    if not enable or not (features.choose(enable, *_FOLLOWS) or features.switch(enable, on=True)):
         raise CameraError(
             f"camera {name} has no PTP, which scheduled action commands need: set trigger.scheduled = false, or use "
             '[trigger] source = "external"'

@@ -14,10 +14,11 @@ import gi
 
 from capture.aravis.action import lock_clock
 from capture.aravis.clock import CameraClock
-from capture.aravis.configuration import SOFTWARE_TRIGGER, configure, region_limits
+from capture.aravis.configuration import configure, region_limits
 from capture.aravis.features import Features
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
 from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
+from capture.aravis.trigger import SOFTWARE_TRIGGER
 from capture.command_times import CommandTimes
 from capture.seam import Arrival
 from rig.action import ActionKeys
@@ -44,6 +45,7 @@ _QUEUE_S = 0.5
 _QUEUE_BYTES = 24 << 20
 _QUEUE_LEAST = 8
 _BY_CABLE: Final = ExternalTrigger()
+_TEMPERATURES: Final = ("DeviceTemperature", "TemperatureAbs")  # the second: Basler, before the convention
 
 
 class AravisCamera:
@@ -184,9 +186,10 @@ class AravisCamera:
             "missing_packets": stream.get_info_uint64_by_name("n_missing_packets"),
         }
         try:
-            if self._device.is_feature_available("DeviceTemperature"):
-                celsius = self._device.get_float_feature_value("DeviceTemperature")
-                counted["temperature_mdeg"] = max(0, round(celsius * 1000))
+            for name in _TEMPERATURES:
+                if (celsius := self._features.measured(name)) is not None:
+                    counted["temperature_mdeg"] = max(0, round(celsius * 1000))
+                    break
         except GLib.Error as error:
             raise CameraError(f"camera {self._name} does not answer: {error.message}") from None
         return counted

@@ -3,10 +3,19 @@
 Nothing here raises because a feature is missing or refuses a value: the caller learns it and decides what that costs.
 """
 
+from typing import Final
+
 import gi
 
 gi.require_version("Aravis", "0.8")
 from gi.repository import Aravis, GLib  # noqa: E402  (the version must be required first)
+
+#: Nodes of a description that may bear the name of a feature, and are none: makers name categories "Gain".
+_NO_FEATURES: Final = (Aravis.GcCategory, Aravis.GcPort)
+
+
+_ON: Final = ("On", "Continuous", "True", "Enable", "Enabled")
+_OFF: Final = ("Off", "False", "Disable", "Disabled")
 
 
 class Features:
@@ -24,15 +33,25 @@ class Features:
         del self._device
 
     def has(self, name: str) -> bool:
-        """Whether the feature is there and usable at present."""
+        """Whether the feature is there and usable at present; a category of that name is none."""
         try:
+            if isinstance(self._device.get_feature(name), _NO_FEATURES):
+                return False
             return bool(self._device.is_feature_available(name))
         except GLib.Error:
             return False
 
-    def first(self, *names: str) -> str | None:
-        """The first feature of these that is there."""
-        return next((name for name in names if self.has(name)), None)
+    def first_number(self, *names: str) -> str | None:
+        """The first of these that is a number."""
+        return next((name for name in names if self._is_number(name)), None)
+
+    def _is_number(self, name: str) -> bool:
+        feature = self._device.get_feature(name)
+        return (
+            isinstance(feature, Aravis.GcFloat | Aravis.GcInteger)
+            and not isinstance(feature, Aravis.GcEnumeration | Aravis.GcBoolean)
+            and self.has(name)
+        )
 
     def entries(self, name: str) -> list[str]:
         """Names of the values that an enumeration takes at present; empty if there is no such enumeration."""
@@ -42,30 +61,36 @@ class Features:
             return []
 
     def choose(self, name: str, *entries: str) -> str | None:
-        """Set an enumeration to the first of these values that it takes.
+        """Set an enumeration to the first of these values that it takes, or already has.
 
         Returns:
             The value; None if there is no such feature, no such value, or the camera refuses.
         """
         there = self.entries(name)
-        for entry in entries:
-            if entry in there:
-                try:
-                    self._device.set_string_feature_value(name, entry)
-                except GLib.Error:
-                    continue
-                return entry
-        return None
+        return next((entry for entry in entries if entry in there and self._becomes(name, entry)), None)
+
+    def _becomes(self, name: str, entry: str) -> bool:
+        """Set an enumeration that has the value not already: many can only be read, or have one value."""
+        if self.chosen(name) == entry:
+            return True
+        try:
+            self._device.set_string_feature_value(name, entry)
+        except GLib.Error:
+            return False
+        return self.chosen(name) in {entry, None}  # some cannot be read back
 
     def chosen(self, name: str) -> str | None:
         """Present value of an enumeration; None if it cannot be read."""
         try:
-            return str(self._device.get_string_feature_value(name))
+            if not isinstance(self._device.get_feature(name), Aravis.GcEnumeration):
+                return None
+            value = self._device.get_string_feature_value(name)
         except GLib.Error:
             return None
+        return None if value is None else str(value)
 
     def switch(self, name: str, *, on: bool) -> bool:
-        """Set a feature that is an enumeration "Off"/"On" with some makers and a boolean with others.
+        """Set a feature that is an enumeration "Off"/"On" with some makers, a boolean or a number with others.
 
         Returns:
             Whether it is so now.
@@ -73,39 +98,43 @@ class Features:
         if not self.has(name):
             return False
         if self.entries(name):
-            return self.choose(name, *(("On", "Continuous") if on else ("Off",))) is not None
+            return self.choose(name, *(_ON if on else _OFF)) is not None
+        if self._is_number(name):
+            return self.set_number(name, on) == on
         try:
-            self._device.set_boolean_feature_value(name, on)
+            if bool(self._device.get_boolean_feature_value(name)) != on:
+                self._device.set_boolean_feature_value(name, on)
+            return bool(self._device.get_boolean_feature_value(name)) == on
         except GLib.Error:
             return False
-        return True
 
     def set_number(self, name: str, value: float) -> float | None:
-        """Set a number, within the limits that the camera names.
+        """Set a number, within the limits that the camera names, unless it is so already.
 
         Returns:
-            What the camera has made of it; None if there is no such feature, or the camera refuses.
+            What it is now; None if there is no such number, or the camera refuses and it is another one.
         """
+        if self.number(name) == value:  # many can only be read, and are right
+            return float(value)
         try:
-            feature = self._device.get_feature(name)
-            if feature is None or not self.has(name):
+            if not self._is_number(name):
                 return None
-            if isinstance(feature, Aravis.GcFloat):
+            if isinstance(self._device.get_feature(name), Aravis.GcFloat):
                 low, high = self._device.get_float_feature_bounds(name)
                 self._device.set_float_feature_value(name, min(max(value, low), high))
-                return float(self._device.get_float_feature_value(name))
-            low, high = self._device.get_integer_feature_bounds(name)
-            step = max(1, self._device.get_integer_feature_increment(name))
-            nearest = low + round((min(max(value, low), high) - low) / step) * step
-            self._device.set_integer_feature_value(name, nearest)
-            return float(self._device.get_integer_feature_value(name))
+            else:
+                low, high = self._device.get_integer_feature_bounds(name)
+                step = max(1, self._device.get_integer_feature_increment(name))
+                steps = min(round((min(max(value, low), high) - low) / step), (high - low) // step)
+                self._device.set_integer_feature_value(name, low + steps * step)
         except GLib.Error:
             return None
+        return self.number(name)
 
     def bounds(self, name: str) -> tuple[int, int, int] | None:
         """Least value, largest value and step of an integer at present; None if it cannot be read."""
         try:
-            if not isinstance(self._device.get_feature(name), Aravis.GcInteger) or not self.has(name):
+            if not self._is_number(name) or isinstance(self._device.get_feature(name), Aravis.GcFloat):
                 return None
             low, high = self._device.get_integer_feature_bounds(name)
             return int(low), int(high), max(1, int(self._device.get_integer_feature_increment(name)))
@@ -129,14 +158,21 @@ class Features:
     def number(self, name: str) -> float | None:
         """Present value of a number; None if it cannot be read."""
         try:
-            feature = self._device.get_feature(name)
-            if feature is None or not self.has(name):
-                return None
-            if isinstance(feature, Aravis.GcFloat):
-                return float(self._device.get_float_feature_value(name))
-            return float(self._device.get_integer_feature_value(name))
+            return self.measured(name)
         except GLib.Error:
             return None
+
+    def measured(self, name: str) -> float | None:
+        """Present value of a number; None if it is not there at present.
+
+        Raises:
+            GLib.Error: the camera does not answer, or refuses.
+        """
+        if not self._is_number(name):
+            return None
+        if isinstance(self._device.get_feature(name), Aravis.GcFloat):
+            return float(self._device.get_float_feature_value(name))
+        return float(self._device.get_integer_feature_value(name))
 
     def execute(self, name: str) -> bool:
         """Execute a command; whether the camera has done so."""

@@ -183,7 +183,8 @@ class Sensor:
         """Selected source of triggers; None: the camera runs free."""
         if not self._registers.number("TriggerMode"):
             return None
-        return TriggerSource(self._registers.number("TriggerSource"))
+        number = self._registers.number("TriggerSource")
+        return TriggerSource(number) if number in set(TriggerSource) else TriggerSource.LINE1  # nothing comes in there
 
     def _next_trigger(self) -> Trigger | None:
         """The next trigger that is known; None if there is none."""

@@ -178,13 +178,16 @@ def _of_the_maker(features: Sequence[Feature], dialect: Dialect, named: Mapping[
         yield replace(
             feature,
             name=dialect.names.get(feature.name, feature.name),
+            node=feature.node if entries is None else Node.ENUMERATION,
+            category=dialect.categories.get(feature.category, feature.category),
             entries=_offered(feature, dialect) if entries is None else _numbered(entries),
             maximum=_reachable(feature.maximum, dialect.without),
         )
     for extra in dialect.extra:
         node = Node.FLOAT if extra.real else Node.ENUMERATION if extra.entries else Node.INTEGER
         node = Node.COMMAND if extra.command else Node.BOOLEAN if extra.boolean else node
-        yield Feature(extra.name, node, _ACQUISITION, named[extra.name], entries=_numbered(extra.entries))
+        category = dialect.categories.get(extra.category, extra.category)
+        yield Feature(extra.name, node, category, named[extra.name], entries=_numbered(extra.entries))
 
 
 def _numbered(entries: Sequence[str]) -> tuple[tuple[str, int], ...]:

@@ -3,7 +3,8 @@
 A simulated camera has all features of the naming convention (SFNC); as a camera of a maker it has others instead.
 Sources: Basler ace GigE (Product Documentation, "Features"), FLIR Blackfly S (Technical Reference), Hikrobot area scan
 cameras (GigE user manual), Allied Vision Manta and Mako ("GigE Features Reference"), JAI Go series (user manual),
-The Imaging Source 33G ("GigE property reference").
+The Imaging Source 33G ("GigE property reference"). What the others leave out is after what users of their descriptions
+report: Point Grey Flea3 GE, Prosilica GC, Imperx, JAI with a trigger line, Basler ace 2.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,6 +26,11 @@ class Maker(StrEnum):
     ALLIED_VISION = "allied-vision-manta"
     JAI = "jai-go"
     IMAGING_SOURCE = "imaging-source-33g"
+    POINT_GREY = "point-grey-flea3-ge"
+    PROSILICA = "prosilica-gc"
+    IMPERX = "imperx"
+    JAI_LINES = "jai-trigger-lines"
+    BASLER_ACE_2 = "basler-ace-2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +44,8 @@ class Extra:
         command: whether it is a command.
         boolean: whether it is a boolean.
         maximum: of a number.
+        read_only: whether the camera refuses to have it written.
+        category: in which it is listed.
     """
 
     name: str
@@ -47,6 +55,8 @@ class Extra:
     boolean: bool = False
     command: bool = False
     maximum: float = 1e6
+    read_only: bool = False
+    category: str = "AcquisitionControl"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +70,8 @@ class Dialect:
         extra: further features.
         latch_register: whether the bootstrap register latches the clock.
         formats: pixel formats that these cameras have; empty: all.
+        read_only: standard features that cannot be written.
+        categories: the maker's name of a category by the standard one.
     """
 
     names: Mapping[str, str] = field(default_factory=dict)
@@ -68,6 +80,8 @@ class Dialect:
     extra: tuple[Extra, ...] = ()
     latch_register: bool = True
     formats: tuple[str, ...] = ()
+    read_only: frozenset[str] = frozenset()
+    categories: Mapping[str, str] = field(default_factory=dict)
 
 
 _AUTO: Final = ("Off", "Once", "Continuous")
@@ -81,8 +95,11 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
     Maker.STANDARD: Dialect(),
     Maker.BASLER: Dialect(
         formats=("Mono8", "Mono12", "Mono12Packed"),
-        names={"ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs"},
-        without=_SHORT_IDS | _COUNTERS | {"Gain", "PtpEnable", "PtpStatus", "DeviceTemperature"},
+        names={
+            "ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs",
+            "DeviceTemperature": "TemperatureAbs",
+        },
+        without=_SHORT_IDS | _COUNTERS | {"Gain", "PtpEnable", "PtpStatus"},
         entries={
             "TriggerSelector": ("FrameStart", "AcquisitionStart"),
             "TriggerSource": ("Line1", "Line3", "Software", "Action1"),
@@ -109,26 +126,35 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             Extra("BinningHorizontal", 2, maximum=4), Extra("BinningVertical", 2, maximum=4),
             Extra("TimestampLatch", command=True), Extra("TimestampLatchValue"),
             Extra("DeviceLinkThroughputLimitMode", 1, ("Off", "On")),
+            Extra("ActionSelector", 0, ("Action0",), read_only=True),
         ),
         latch_register=False,
     ),
     Maker.HIKROBOT: Dialect(
         formats=_PACKED_AS_BEFORE,
         without=_SHORT_IDS | _COUNTERS | {"PtpEnable", "GevIEEE1588", "GevIEEE1588Status", "AcquisitionFrameRate"},
-        entries={"TriggerSelector": ("FrameBurstStart",), "TriggerSource": ("Line0", "Line2", "Software")},
+        entries={
+            "TriggerSelector": ("FrameBurstStart",),
+            "TriggerSource": ("Line0", "Line2", "Software", "Action1", "Action2", "Action3", "Action4"),
+        },
         extra=(
             Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO),
             Extra("AcquisitionBurstFrameCount", 3, maximum=1023), Extra("TriggerDelay", 0.0, real=True),
             Extra("LineSelector", 0, ("Line0", "Line1")), Extra("LineMode", 0, ("Input", "Strobe")),
-            Extra("LineDebouncerTime", 50), Extra("GammaEnable", 0, boolean=True),
+            Extra("LineDebouncerTime", 50), Extra("GammaEnable", 0, boolean=True), Extra("ActionSelector", maximum=0),
         ),
     ),
     Maker.ALLIED_VISION: Dialect(
-        names={"ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs"},
-        without=_COUNTERS | {"AcquisitionFrameRateEnable", "PtpEnable", "OffsetX", "OffsetY"},
+        names={
+            "ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs",
+            "PtpEnable": "PtpMode",
+        },
+        without=_COUNTERS
+        | {"AcquisitionFrameRateEnable", "GevIEEE1588", "GevIEEE1588Status", "OffsetX", "OffsetY"},
         entries={
             "TriggerSelector": ("FrameStart", "AcquisitionStart", "AcquisitionEnd"),
-            "TriggerSource": ("Line1", "Line2", "Software", "Freerun"),
+            "TriggerSource": ("Line1", "Line2", "Software", "Action0", "Freerun"),
+            "PtpEnable": ("Off", "Slave", "Master", "Auto"),
         },
         extra=(
             Extra("ExposureAuto", _CONTINUOUS, ("Off", "Once", "Continuous", "Other")),
@@ -151,6 +177,61 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
         entries={"TriggerSource": ("Any",)},
         extra=(Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO)),
     ),
+    Maker.POINT_GREY: Dialect(
+        without=_SHORT_IDS | _COUNTERS | {"PtpEnable", "GevIEEE1588"},
+        entries={
+            "TriggerSelector": ("ExposureStart", "ExposureActive"),
+            "TriggerSource": ("Line0", "Line1", "Software"),
+        },
+        read_only=frozenset({"TriggerSelector"}),
+        extra=(Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO)),
+    ),
+    Maker.PROSILICA: Dialect(
+        names={"ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs"},
+        without=_SHORT_IDS | _COUNTERS | {"AcquisitionFrameRateEnable", "Gain", "PtpEnable", "GevIEEE1588"},
+        entries={"TriggerSource": ("Line1", "Line2", "Software")},
+        categories={"AnalogControl": "Gain"},
+        extra=(
+            Extra("GainAuto", _CONTINUOUS, _AUTO, category="AnalogControl"),
+            Extra("GainRaw", 12, maximum=30, category="AnalogControl"),
+        ),
+    ),
+    Maker.IMPERX: Dialect(
+        without=_SHORT_IDS | _COUNTERS | {"ExposureTime", "PtpEnable", "GevIEEE1588"},
+        entries={"TriggerSource": ("Line1", "Line2", "Software", "PulseGenerator")},
+        categories={"AcquisitionControl": "Exposure", "AnalogControl": "Gain"},
+        extra=(Extra("ExposureTimeRaw", 9000),),
+    ),
+    Maker.JAI_LINES: Dialect(
+        formats=_PACKED_AS_BEFORE,
+        names={"TriggerMode": "ExposureMode", "TriggerSource": "LineSource"},
+        without=_SHORT_IDS | _COUNTERS | {
+            "ExposureMode", "TriggerSelector", "TriggerActivation", "TriggerSoftware", "AcquisitionFrameRateEnable",
+            "Gain", "ExposureTime", "PtpEnable", "GevIEEE1588",
+        },
+        entries={
+            "TriggerMode": ("Continuous", "EdgePreSelect", "PulseWidthControl"),
+            "TriggerSource": ("Line4", "Line5", "SoftwareTrigger0", "Action1"),
+        },
+        extra=(
+            Extra("LineSelector", 1, ("CameraTrigger0", "GPOut1")),
+            Extra("LineInverter", 1, ("ActiveHigh", "ActiveLow")),
+            Extra("ShutterMode", 0, ("NoShutter", "ProgrammableExposure")),
+            Extra("ExposureTimeRaw", 9000), Extra("GainRaw", 40, maximum=800),
+        ),
+    ),
+    Maker.BASLER_ACE_2: Dialect(
+        without=_COUNTERS | {"PtpStatus", "GevIEEE1588", "GevIEEE1588Status", "PtpEnable"},
+        entries={
+            "TriggerSelector": ("FrameBurstStart", "FrameStart"),
+            "TriggerSource": ("Line1", "Line2", "Software", "Action1"),
+        },
+        extra=(
+            Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO),
+            Extra("DeviceLinkThroughputLimitMode", 0, ("On",)),
+            Extra("DeviceLinkThroughputLimit", 10_000_000, maximum=125_000_000),
+        ),
+    ),
 }  # fmt: skip
 
 _BASE, _STEP = 0x11000, 8
@@ -170,6 +251,8 @@ def _as_made(register: Register, dialect: Dialect) -> Register:
         return replace(register, default=0)  # such a camera takes every pulse
     if register.name == "PixelFormat" and dialect.formats:
         return replace(register, choices=tuple(FORMATS[name].code for name in dialect.formats))
+    if register.name in dialect.read_only:
+        register = replace(register, writable=False)
     if register.choices and register.name in dialect.entries:
         return replace(register, choices=tuple(range(len(dialect.entries[register.name]))))
     return register
@@ -180,7 +263,8 @@ def _register(extra: Extra, address: int) -> Register:
         return Register(extra.name, address, writable=True, choices=(1,))
     if extra.entries or extra.boolean:
         choices = tuple(range(len(extra.entries) or 2))
-        return Register(extra.name, address, default=int(extra.default), writable=True, choices=choices)
+        writable = not extra.read_only
+        return Register(extra.name, address, default=int(extra.default), writable=writable, choices=choices)
     if extra.real:
         return Register(
             extra.name,

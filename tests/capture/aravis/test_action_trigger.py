@@ -17,7 +17,8 @@ from rig.settings.trigger import ActionTrigger
 from rig.transport.ring import CameraRing
 from simrig.gige.camera import Camera
 from simrig.gige.configuration import CameraConfig
-from simrig.gige.registers.makers import Maker
+from simrig.gige.registers.makers import DIALECTS, Maker
+from simrig.gige.registers.register_table import PtpStatus
 from tests.capture.rigs import SCENARIO, make_rig
 from tests.capture.station import Station
 from tests.support.loopback import Loopback
@@ -77,6 +78,15 @@ def _hill(
             ring.close()
 
 
+def _makers(feature: str, entry: str) -> list[Maker]:
+    """Those whose enumeration has such an entry."""
+    return [
+        maker
+        for maker, dialect in DIALECTS.items()
+        if any(each.startswith(entry) for each in dialect.entries.get(feature, ()))
+    ]
+
+
 def _trigger(**more: object) -> ActionTrigger:
     return ActionTrigger.model_validate({"source": "action", "rate_hz": 20.0, **more})
 
@@ -112,9 +122,12 @@ def test_scheduled_commands_by_broadcast_expose_all_cameras_at_whole_multiples_o
     assert len(pulses[0] & pulses[1]) >= 4
 
 
-def test_commands_at_once_to_each_camera_by_the_names_of_another_maker(tmp_path: Path, loopback: Loopback) -> None:
-    """Basler calls the trigger Action1, and counts actions from 1."""
-    with _hill(tmp_path, loopback, Maker.BASLER) as hill, Station(partial(hill.open, 0), hill.rings[0]) as station:
+@pytest.mark.parametrize("maker", _makers("TriggerSource", "Action"))
+def test_commands_at_once_to_each_camera_by_the_names_of_another_maker(
+    tmp_path: Path, loopback: Loopback, maker: Maker
+) -> None:
+    """The trigger is Action0 or Action1, and which action's keys are set is a number, a name, or cannot be chosen."""
+    with _hill(tmp_path, loopback, maker) as hill, Station(partial(hill.open, 0), hill.rings[0]) as station:
         station.await_records(RecordKind.LATCH, 16)
         with hill.sender(_trigger()) as sender:
             sender.seen([True, False], [None, None])
@@ -151,6 +164,14 @@ def test_a_camera_without_reference_time_and_one_that_answers_nothing_are_told_b
     ]  # fmt: skip
     assert (first.acknowledged, second.acknowledged) == (0, 0)
     assert min(first.refused, second.unanswered) >= 3
+
+
+@pytest.mark.parametrize("maker", [Maker.FLIR, Maker.ALLIED_VISION])
+def test_ptp_is_switched_on_by_whatever_name_it_has(tmp_path: Path, loopback: Loopback, maker: Maker) -> None:
+    with _hill(tmp_path, loopback, maker) as hill:
+        _with(hill, _trigger(scheduled=True))
+        hill.open(0, hill.rings[0]).close()
+        assert hill.cameras[0]._device._clock.ptp_status(host_now()) is PtpStatus.SLAVE
 
 
 def test_commands_of_another_rig_expose_nothing(tmp_path: Path, loopback: Loopback) -> None:
@@ -192,7 +213,7 @@ def test_commands_that_cannot_be_sent_are_told() -> None:
 @pytest.mark.parametrize(
     ("maker", "scheduled", "told"),
     [
-        (Maker.HIKROBOT, False, r"camera K1 has no action trigger \(its TriggerSource has Line0, Line2, Software\)"),
+        (Maker.PROSILICA, False, r"camera K1 has no action trigger \(its TriggerSource has Line1, Line2, Software\)"),
         (Maker.JAI, False, "camera K1 has no action trigger"),
         (Maker.BASLER, True, "camera K1 has no PTP lock"),
     ],

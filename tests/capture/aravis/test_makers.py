@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,6 +26,7 @@ HARMLESS = {
     "TriggerMode": 1, "AcquisitionFrameRateEnable": 0, "ExposureAuto": 0, "GainAuto": 0, "GammaEnable": 0,
     "ReverseX": 0, "BinningHorizontal": 1, "BinningVertical": 1, "AcquisitionBurstFrameCount": 1, "TestPattern": 0,
     "TestImageSelector": 0, "TriggerOverlap": 1, "DeviceLinkThroughputLimitMode": 0, "GainRaw": 0,
+    "DeviceLinkThroughputLimit": 125_000_000, "LineSelector": 0, "LineInverter": 0, "ShutterMode": 1,
 }  # fmt: skip
 
 
@@ -34,6 +36,13 @@ class Made:
     def __init__(self, maker: Maker, rig: RigSettings, camera: Camera, ring: CameraRing) -> None:
         self.maker, self.rig, self.ring = maker, rig, ring
         self.registers: RegisterMap = camera._device._registers
+
+    @property
+    def exposure_us(self) -> float:
+        """By the feature of its description."""
+        if "ExposureTime" in DIALECTS[self.maker].without:
+            return self.registers.number("ExposureTimeRaw")
+        return self.registers.real("ExposureTime")
 
     @contextmanager
     def opened(self, **settings: object) -> Iterator[AravisCamera]:
@@ -52,7 +61,12 @@ class Made:
 
 @pytest.fixture
 def made(request: pytest.FixtureRequest, tmp_path: Path, loopback: Loopback) -> Iterator[Made]:
-    maker: Maker = request.param
+    with _made(request.param, tmp_path, loopback) as made:
+        yield made
+
+
+@contextmanager
+def _made(maker: Maker, tmp_path: Path, loopback: Loopback) -> Iterator[Made]:
     rig = make_rig(tmp_path, "aravis", loopback, names=["K2"])
     config = CameraConfig(
         name="K2", address=rig.cameras[0].address, scenario=SCENARIO, rate_hz=rig.trigger.rate_hz, epoch=host_now(),
@@ -74,12 +88,13 @@ def test_a_camera_of_any_maker_takes_one_frame_per_pulse_as_the_rig_file_says(ma
         assert {name: registers.number(name) for name in HARMLESS if name in registers} == {
             name: value for name, value in HARMLESS.items() if name in registers
         }
-        assert registers.real("ExposureTime") == made.rig.cameras[0].exposure_us
+        assert made.exposure_us == made.rig.cameras[0].exposure_us
         selectors = DIALECTS[made.maker].entries.get("TriggerSelector", ("FrameStart",))
-        assert selectors[registers.number("TriggerSelector")] in {"FrameStart", "FrameBurstStart"}
+        assert selectors[registers.number("TriggerSelector")] in {"FrameStart", "FrameBurstStart", "ExposureStart"}
         camera.start()
         pulses, times = _frames(camera, made, 6)
         assert pulses == list(range(pulses[0], pulses[0] + 6))
+        assert camera.counters()["temperature_mdeg"] > 0
         latch = camera.latch()
         assert latch.device > times[-1]
         periods = [(after - before) * made.rig.trigger.rate_hz / NS_PER_S for before, after in pairwise(times)]
@@ -116,6 +131,11 @@ def _frames(camera: AravisCamera, made: Made, count: int) -> tuple[list[int], li
             {"pixel_format": "Mono10p"},
             "has no pixel format Mono10p (it has Mono8, Mono10, Mono12, ",
         ),
+        (
+            Maker.JAI_LINES,
+            {"trigger_input": "Line7"},
+            'has no trigger input "Line7" (it has Line4, Line5, SoftwareTrigger0, Action1)',
+        ),
     ],
     indirect=["made"],
 )
@@ -125,6 +145,17 @@ def test_what_would_make_a_recording_wrong_is_refused_with_what_the_camera_has(
     with pytest.raises(CameraError) as refused, made.opened(**settings):
         pass
     assert told in str(refused.value)
+
+
+def test_a_camera_whose_exposure_mode_is_unknown_is_refused_with_what_is_true(
+    tmp_path: Path, loopback: Loopback, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialect = DIALECTS[Maker.JAI_LINES]
+    modes = {**dialect.entries, "TriggerMode": ("Continuous", "PulseWidthControl")}
+    monkeypatch.setitem(DIALECTS, Maker.JAI_LINES, replace(dialect, entries=modes))
+    told = "it has no TriggerMode, and its ExposureMode has Continuous, PulseWidthControl, none of which is known here"
+    with _made(Maker.JAI_LINES, tmp_path, loopback) as made, pytest.raises(CameraError, match=told), made.opened():
+        pass
 
 
 @pytest.mark.parametrize(

@@ -61,6 +61,7 @@ _COMMANDS: Final = {
     "analyze": ("jumps.analyze", "analyze_command", "Measure the jumps of a recording."),
     "digitize": ("jumps.digitize", "digitize_command", "Measure a recording by hand, in the browser."),
     "compare": ("jumps.compare", "compare", "Compare two measured jumps."),
+    "season": ("jumps.season", "app", "Measure and compare the jumps of a season."),
     "network": ("networks.network", "app", "Make a network out of files of other programs."),
     "plan": ("networks.plan", "plan", "Predict the accuracy of planned cameras."),
     "bench": ("computer.bench", "bench", "Measure how fast this computer records."),

@@ -37,15 +37,15 @@ def write(result: MeasuredRecording, path: Path) -> None:
     Raises:
         OSError: the disk refuses.
     """
-    rows = [{"jump": jump.number, **dict(_row(pulse))} for jump in result.jumps for pulse in jump.pulses]
+    rows = [{"jump": jump.number, **dict(pulse_cells(pulse))} for jump in result.jumps for pulse in jump.pulses]
     with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, ["jump", *(name for name, _ in _row(None))])
+        table = csv.DictWriter(file, ["jump", *(name for name, _ in pulse_cells(None))])
         table.writeheader()
         table.writerows(rows)
 
 
-def _row(pulse: PulseState | None) -> Cells:
-    """The cells of a pulse; without one, empty ones, for their names."""
+def pulse_cells(pulse: PulseState | None) -> Cells:
+    """The cells of a pulse, with the names of their columns; without one, empty ones, for their names."""
     yield "pulse", "" if pulse is None else int(pulse.pulse)
     yield "time_utc_ns", "" if pulse is None else int(pulse.time)
     yield "since_takeoff_s", "" if pulse is None else _text(pulse.since_takeoff_s, 6)

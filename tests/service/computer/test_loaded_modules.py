@@ -11,8 +11,8 @@ import pytest
     [
         ("service.processes.programs.grabber", ("simrig", "cv2", "recorder", "capture.iidc", "gi")),
         ("service.processes.programs.recorder", ("simrig", "cv2", "recorder.reading", "capture")),
-        ("svev.commands.rig.record", ("simrig", "cv2", "scipy", "fastapi", "capture.iidc")),
-        ("svev.commands.rig.serve", ("simrig", "scipy")),
+        ("svev.commands.rig.record", ("simrig", "cv2", "scipy", "fastapi", "capture.iidc", "season", "dask", "duckdb")),
+        ("svev.commands.rig.serve", ("simrig", "scipy", "season", "dask", "duckdb")),
     ],
 )
 def test_nothing_is_loaded_that_real_cameras_do_not_need(program: str, needless: tuple[str, ...]) -> None:

@@ -1,0 +1,1 @@
+"""A season: many logs measured on many machines, and what they say together."""

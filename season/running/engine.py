@@ -1,0 +1,205 @@
+"""Runs tasks on a Dask cluster: of this computer's cores, or of a scheduler that somebody else has started.
+
+Never more than two tasks per thread are under way, so that the scheduler's memory does not grow with the season, and
+the number of workers never changes (decision 0077). A task whose worker dies is run again when all others are done,
+alone: a worker that dies then dies by it.
+"""
+
+import logging
+import os
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+import dask
+from dask.utils import format_bytes
+from distributed import Client, Future, KilledWorker, LocalCluster, wait
+from distributed.comm.core import CommClosedError
+
+from rig.errors import BadInputError, ProcessDiedError
+from season.campaign import Cluster
+
+_PER_THREAD: Final = 2
+_CONNECT_S: Final = 10.0
+_LOOK_S: Final = 2.0
+_PATIENCE: Final = 60
+_LOCAL: Final = "127.0.0.1"
+#: Results are on the disk: nothing is kept in a worker's memory that it could move there or wait for.
+_CONFIGURED: Final = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+    "distributed.worker.daemon": True,
+}
+
+
+class Hearer(Protocol):
+    """Is told what becomes of the tasks of a run."""
+
+    def started(self, name: str) -> None:
+        """A task is under way, or again."""
+
+    def done(self, name: str) -> None:
+        """A task has ended."""
+
+    def failed(self, name: str, error: BaseException) -> None:
+        """A task has ended by an error."""
+
+    def killed(self, name: str, why: str) -> None:
+        """A task has ended two workers and is not tried again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """A cluster to run tasks on.
+
+    Attributes:
+        client: connected to its scheduler.
+        dashboard: address of Dask's own page; None if there is none.
+    """
+
+    client: Client
+    dashboard: str | None
+
+    @property
+    def threads(self) -> int:
+        """Threads of all workers, now."""
+        return sum(self.client.nthreads().values())
+
+
+@contextmanager
+def engine(cluster: Cluster, dashboard: str) -> Iterator[Engine]:
+    """Start workers on this computer, or connect to a scheduler.
+
+    Args:
+        cluster: which.
+        dashboard: address of the dashboard of a cluster of this computer, host:port; port 0: any free one.
+
+    Raises:
+        BadInputError: the scheduler does not answer, or has no workers.
+    """
+    with dask.config.set(_CONFIGURED):
+        if cluster.scheduler is None:
+            count = cluster.workers or len(os.sched_getaffinity(0))
+            with (
+                LocalCluster(
+                    host=_LOCAL, n_workers=count, threads_per_worker=1, memory_limit=cluster.memory_bytes,
+                    dashboard_address=dashboard, silence_logs=logging.CRITICAL,
+                ) as local,
+                Client(local) as client,
+            ):  # fmt: skip
+                yield Engine(client, local.dashboard_link)
+            return
+        try:
+            client = Client(cluster.scheduler, timeout=_CONNECT_S)
+        except (OSError, ValueError) as error:
+            raise BadInputError(
+                f"{cluster.scheduler}: no Dask scheduler answers there ({error}); start one by `dask scheduler`"
+            ) from error
+        with client:
+            if not client.nthreads():
+                raise BadInputError(
+                    f"{cluster.scheduler}: has no workers; start some by `dask worker {cluster.scheduler}`"
+                )
+            yield Engine(client, client.dashboard_link)
+
+
+def run_tasks(on: Engine, function: Callable[..., Any], arguments: Mapping[str, Any], hearer: Hearer) -> None:
+    """Run a function once for each name, on any worker.
+
+    Args:
+        on: the cluster.
+        function: to run; what it returns is not fetched.
+        arguments: of the function, by name.
+        hearer: is told what becomes of them.
+
+    Raises:
+        ProcessDiedError: the scheduler is gone, or no worker came back.
+    """
+    try:
+        suspects = _Run(on, function, arguments, hearer, last=False).all_of(arguments)
+        _Run(on, function, arguments, hearer, last=True).all_of(suspects)
+    except (CommClosedError, OSError) as error:
+        raise _gone(str(error)) from error
+
+
+class _Run:
+    """Tasks until the last of them has ended.
+
+    Args:
+        on, function, arguments, hearer: as `run_tasks`.
+        last: these tasks have each seen a worker die; they run one at a time, and another death ends them.
+    """
+
+    def __init__(
+        self, on: Engine, function: Callable[..., Any], arguments: Mapping[str, Any], hearer: Hearer, *, last: bool
+    ) -> None:
+        self._on, self._function, self._arguments, self._hearer = on, function, arguments, hearer
+        self._last = last
+        self._names: dict[Future[Any], str] = {}
+        self._suspects: list[str] = []
+
+    def all_of(self, names: Iterable[str]) -> list[str]:
+        """Run these tasks.
+
+        Returns:
+            Those that saw a worker die.
+        """
+        left = deque(names)
+        while left or self._names:
+            room = 1 if self._last else _PER_THREAD * self._on.threads
+            while left and len(self._names) < room:
+                self._submit(left.popleft())
+            for future in self._ended():
+                self._end(self._names.pop(future), future)
+        return self._suspects
+
+    def _submit(self, name: str) -> None:
+        # pure=False: a name of its own, else Dask would take the result of an equal task for that of this one.
+        future = self._on.client.submit(self._function, self._arguments[name], pure=False)
+        self._names[future] = name
+        self._hearer.started(name)
+
+    def _ended(self) -> set[Future[Any]]:
+        """Wait for the first of the tasks to end.
+
+        Returns:
+            Those that have ended; perhaps none, when there may be room for more.
+
+        Raises:
+            ProcessDiedError: no worker came back.
+        """
+        for _ in range(_PATIENCE):
+            if self._names:
+                with suppress(TimeoutError):
+                    done, _ = wait(list(self._names), timeout=_LOOK_S, return_when="FIRST_COMPLETED")
+                    return set(done)
+            else:
+                time.sleep(_LOOK_S)  # all workers are being started again
+            if self._on.threads:
+                return set()
+        raise _gone(f"no worker for {_PATIENCE * _LOOK_S:g} s")
+
+    def _end(self, name: str, future: Future[Any]) -> None:
+        if future.status == "finished":
+            self._hearer.done(name)
+        elif future.status != "error":
+            raise _gone(f"a task is {future.status}")
+        elif not isinstance(error := future.exception(timeout=_CONNECT_S), KilledWorker):
+            self._hearer.failed(name, error)
+        elif self._last or error.allowed_failures:  # of another's scheduler, which has tried more often itself
+            limit = format_bytes(error.last_worker.memory_limit) if error.last_worker.memory_limit else "its"
+            self._hearer.killed(name, limit)
+        else:
+            self._suspects.append(name)
+
+
+def _gone(why: str) -> ProcessDiedError:
+    return ProcessDiedError(
+        f"the Dask scheduler or its workers are gone ({why}); run the season again: what is measured stays"
+    )

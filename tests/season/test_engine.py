@@ -1,0 +1,53 @@
+"""Tasks on a real cluster of two processes, some of which kill their worker."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.season.files import campaign_file, log_file
+from tests.support.loopback import Loopback
+
+
+def run_tiny(folder: Path, names: list[str], timeout_s: float = 60) -> dict[str, Any]:
+    """Run tiny tasks; see `tests.season.tiny_tasks`."""
+    program = f"from tests.season.tiny_tasks import main; main({str(folder)!r}, {','.join(names)!r}.split(','))"
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
+    assert done.returncode == 0, done.stderr
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def runs(path: Path) -> int:
+    """How often a task was begun."""
+    return len(path.read_text().splitlines())
+
+
+@pytest.mark.long
+def test_a_task_that_kills_two_workers_is_set_aside_and_no_other_is_accused(tmp_path: Path) -> None:
+    names = [*(f"tiny-{number}" for number in range(40)), "deadly-1", *(f"more-{number}" for number in range(40))]
+    names += ["deadly-2", "wrong"]
+    found = run_tiny(tmp_path, names)
+    assert found["threads"] == 2
+    assert found["dashboard"].startswith("http://127.0.0.1:")
+    assert set(found["ended"]) == set(names)
+    assert {name: said for name, said in found["ended"].items() if said != "done"} == {
+        "deadly-1": "killed: 0.93 GiB", "deadly-2": "killed: 0.93 GiB", "wrong": "failed: wrong",
+    }  # fmt: skip
+    assert {runs(tmp_path / name) for name in names if name.startswith("deadly")} == {2}
+    assert all(runs(tmp_path / name) <= 3 for name in names)  # beside one that killed its worker: again, alone
+
+
+def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, loopback: Loopback) -> None:
+    log_file(tmp_path / "hill" / "a.mcap")
+    address = f"tcp://{loopback.host}:{loopback.free_port()}"
+    command = ["season", "run", str(campaign_file(tmp_path)), "--scheduler", address]
+    done = subprocess.run(
+        [sys.executable, "-m", "svev", *command], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 2
+    assert f"{address}: no Dask scheduler answers there" in done.stderr

@@ -1,0 +1,53 @@
+"""A program that runs tiny tasks on a cluster of its own and prints what was told of each.
+
+A process of its own, since Dask's loop thread lives as long as the interpreter.
+"""
+
+import json
+import os
+import resource
+import signal
+from pathlib import Path
+
+from season.campaign import Cluster
+from season.running.engine import engine, run_tasks
+
+
+class Heard:
+    """What is told of tasks, by name."""
+
+    def __init__(self) -> None:
+        self.ended: dict[str, str] = {}
+
+    def started(self, name: str) -> None:
+        """Nothing is kept."""
+
+    def done(self, name: str) -> None:
+        self.ended[name] = "done"
+
+    def failed(self, name: str, error: BaseException) -> None:
+        self.ended[name] = f"failed: {error}"
+
+    def killed(self, name: str, limit: str) -> None:
+        self.ended[name] = f"killed: {limit}"
+
+
+def note(path: Path) -> str:
+    """A task: notes that it runs; kills its worker, or fails, if its name says so."""
+    with path.open("a") as file:
+        file.write(f"{os.getpid()}\n")
+    if "deadly" in path.name:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if "wrong" in path.name:
+        raise ValueError("wrong")
+    return path.name
+
+
+def main(folder: str, names: list[str]) -> None:
+    """Run tasks of these names, which note in a folder that they run."""
+    heard = Heard()
+    with engine(Cluster(workers=2, memory_gb=1.0), "127.0.0.1:0") as on:
+        about = {"threads": on.threads, "dashboard": on.dashboard}
+        run_tasks(on, note, {name: Path(folder) / name for name in names}, heard)
+    most_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
+    print(json.dumps({**about, "ended": heard.ended, "most_mb": most_mb}))  # noqa: T201 - read by the test

@@ -1,12 +1,15 @@
 """`svev season`: many logs measured together, and what they say together."""
 
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from datetime import date
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
+from rig.errors import BadInputError
 from svev import console
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -53,6 +56,7 @@ def run_command(
     """
     from season.campaign import read_campaign  # noqa: PLC0415 - the help starts at once
     from season.running.run import alone, measure_logs  # noqa: PLC0415
+    from season.tables.database import build  # noqa: PLC0415
 
     read = read_campaign(campaign)
     chosen = {"scheduler": scheduler, "workers": workers, "memory_gb": memory_gb}
@@ -60,6 +64,8 @@ def run_command(
     read = read.model_copy(update={"cluster": cluster})
     with alone(read), _Progress(as_json) as bar:
         logs, state = measure_logs(read, again=again, dashboard=dashboard, started=bar.start, progress=bar.tick)
+        bar.close()
+        build(read, logs)
     counts = state.counts
     failed = {url: entry.problem for url, entry in state.logs.items() if entry.problem is not None}
     for url, problem in list(failed.items())[:_FEW]:
@@ -95,6 +101,10 @@ class _Progress:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Take it away."""
         self._stack.close()
 
     def start(self, logs: int, threads: int, dashboard: str | None) -> None:
@@ -107,3 +117,71 @@ class _Progress:
         """So many logs are done."""
         if self._tell is not None:
             self._tell(done)
+
+
+PlaceOption = Annotated[
+    Path, typer.Option("--in", metavar="PLACE", help="campaign's file, or its folder with season.duckdb")
+]
+
+
+@app.command("query", no_args_is_help=True)
+def query_command(
+    sql: Annotated[str | None, typer.Argument(metavar="SQL", help="statement of DuckDB", show_default=False)] = None,
+    place: PlaceOption = Path(),
+    ask: Annotated[
+        str | None, typer.Option(metavar="NAME", help="a ready question: athletes, jumps, look, best, failed, cameras")
+    ] = None,
+    quantity: Annotated[
+        str, typer.Option(metavar="NAME", help="of --ask athletes: alpha, height, speed, ...")
+    ] = "alpha",
+    distance: Annotated[int, typer.Option(metavar="M", help="of it: 0, 5, 10, 15 or 20 m from the take-off")] = 10,
+    by: Annotated[
+        str, typer.Option(metavar="NAMES", help="of it: athlete, and hill, gate, season, separated by commas")
+    ] = "athlete,hill",
+    as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
+) -> None:
+    """Ask the tables of a season: jumps, pulses, cameras, logs (columns: docs/season.md). Nothing can be changed by it.
+
+    `--ask athletes` gives means with their sigma, and a star where an athlete differs from the others of the same days,
+    corrected for how many are compared.
+
+    Exit codes: 0 answered; 2 bad input.
+
+    Example: svev season query "SELECT athlete, count(*) FROM jumps GROUP BY ALL" --in season.toml
+
+    Example: svev season query --ask athletes --quantity alpha --distance 10 --by athlete,hill,gate,season
+    """
+    from season.tables.comparison import groups  # noqa: PLC0415
+    from season.tables.database import asked, opened  # noqa: PLC0415
+    from season.tables.questions import QUESTIONS  # noqa: PLC0415
+    from svev.commands.jumps.season_tables import aligned, group_rows  # noqa: PLC0415
+
+    if bool(sql) == bool(ask):
+        raise BadInputError(f"give either SQL or --ask with one of athletes, {', '.join(QUESTIONS)}")
+    with opened(_folder(place)) as database:
+        began = time.perf_counter()
+        if ask == "athletes":
+            columns, rows = group_rows(groups(database, quantity, distance, by.replace(" ", "").split(",")))
+        elif ask and ask not in QUESTIONS:
+            raise BadInputError(f"{ask}: there is no such question; ask one of athletes, {', '.join(QUESTIONS)}")
+        else:
+            columns, rows = asked(database, sql or QUESTIONS[ask or ""].sql)
+        took_ms = 1e3 * (time.perf_counter() - began)
+    if as_json:
+        console.print_json({"columns": columns, "rows": [[_plain(cell) for cell in row] for row in rows]})
+        return
+    for line in aligned(columns, rows):
+        console.say(line)
+    console.say(f"{len(rows)} rows in {took_ms:.0f} ms", aside=True)
+
+
+def _folder(place: Path) -> Path:
+    """The folder of a campaign, which may be given by its file."""
+    from season.campaign import read_campaign  # noqa: PLC0415
+
+    return read_campaign(place).out if place.suffix == ".toml" else place
+
+
+def _plain(cell: Any) -> Any:
+    """A cell as JSON can hold it."""
+    return cell.isoformat() if isinstance(cell, date) else cell

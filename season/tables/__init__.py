@@ -1,0 +1,1 @@
+"""One table of all jumps, pulses and cameras of a season, and questions to it."""

@@ -28,6 +28,7 @@ class Svg:
         self.height = height
         self._parts: list[str] = []
         self._taken: list[tuple[float, float, float, float]] = []
+        self._linked = False
 
     def line(self, ends: tuple[float, float, float, float], colour: Colour, *, width: float = 1.0) -> None:
         """A line from (x1, y1) to (x2, y2)."""
@@ -50,6 +51,14 @@ class Svg:
         """A filled circle; labels keep away from it."""
         self._taken.append((x - radius, y - radius, x + radius, y + radius))
         self._parts.append(f'<circle class="{colour}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}"/>')
+
+    def linked_dot(self, x: float, y: float, colour: Colour, href: str, words: str) -> None:
+        """A filled circle that leads to another page; `words` say what it is."""
+        self._linked = True
+        self._parts.append(
+            f'<a href="{escape(href)}" tabindex="-1"><title>{escape(words)}</title>'
+            f'<circle class="{colour}" cx="{x:.1f}" cy="{y:.1f}" r="2"/></a>'
+        )
 
     def ring(self, x: float, y: float, colour: Colour) -> None:
         """An open circle."""
@@ -92,8 +101,9 @@ class Svg:
 
     def rendered(self, words: str) -> str:
         """The drawing as text; `words` describe it for screen readers."""
+        role = "group" if self._linked else "img"
         return (
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {self.height:.0f}" role="img" '
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {self.height:.0f}" role="{role}" '
             f'aria-label="{escape(words)}">{"".join(self._parts)}</svg>'
         )
 

@@ -55,6 +55,7 @@ def run_command(
     Example: svev season run season.toml --workers 4
     """
     from season.campaign import read_campaign  # noqa: PLC0415 - the help starts at once
+    from season.page.page import NAME, write_page  # noqa: PLC0415
     from season.running.run import alone, measure_logs  # noqa: PLC0415
     from season.tables.database import build  # noqa: PLC0415
 
@@ -65,7 +66,8 @@ def run_command(
     with alone(read), _Progress(as_json) as bar:
         logs, state = measure_logs(read, again=again, dashboard=dashboard, started=bar.start, progress=bar.tick)
         bar.close()
-        build(read, logs)
+        if build(read, logs) or not (read.out / NAME).exists():
+            write_page(read.out)
     counts = state.counts
     failed = {url: entry.problem for url, entry in state.logs.items() if entry.problem is not None}
     for url, problem in list(failed.items())[:_FEW]:

@@ -96,10 +96,7 @@ def groups(
     Raises:
         BadInputError: there is no such quantity or distance.
     """
-    if quantity not in NAMES or distance_m not in DISTANCES_M:
-        raise BadInputError(
-            f"{quantity} at {distance_m} m: there are {', '.join(NAMES)} at {', '.join(map(str, DISTANCES_M))} m"
-        )
+    refuse_unknown(quantity, distance_m)
     if "athlete" not in by or not set(by) <= set(_BY):
         raise BadInputError(f"by {', '.join(by)}: groups are by athlete, and by hill, gate or season too")
     others = [name for name in by if name in {"gate", "season"}]
@@ -115,6 +112,18 @@ def groups(
     )
     _, rows = asked(database, sql)
     return _tested([_group(by, row) for row in rows])
+
+
+def refuse_unknown(quantity: str, distance_m: int) -> None:
+    """Refuse a quantity that jumps do not have.
+
+    Raises:
+        BadInputError: there is no such quantity or distance.
+    """
+    if quantity not in NAMES or distance_m not in DISTANCES_M:
+        raise BadInputError(
+            f"{quantity} at {distance_m} m: there are {', '.join(NAMES)} at {', '.join(map(str, DISTANCES_M))} m"
+        )
 
 
 def _group(by: Sequence[str], row: tuple[Any, ...]) -> Group:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from analysis.report.figures import decimals
 from season.tables.comparison import Group
+from season.tables.mixed_effects import MixedEffects
 
 _SIGNIFICANT: Final = 6
 
@@ -25,6 +26,22 @@ def group_rows(found: Iterable[Group]) -> tuple[list[str], list[tuple[Any, ...]]
     return columns, rows
 
 
+def effect_lines(found: MixedEffects, unit: str) -> list[str]:
+    """Effects of athletes and hills as lines."""
+    mean, sigma = _rounded(found.mean.value, found.mean.sigma)
+    rows = [
+        (kind, effect.name, effect.jumps, *_rounded(effect.value, effect.sigma), "*" if effect.is_large else "")
+        for kind, effects in (("athlete", found.athletes), ("hill", found.hills))
+        for effect in effects
+    ]
+    parts = f"athletes {found.sd_athletes:.2g}, days {found.sd_days:.2g}, jumps of one athlete on one day"
+    return [
+        f"{found.jumps} jumps; mean of the athletes on {found.first_hill}: {mean} +- {sigma} {unit}",
+        f"standard deviations: {parts} {found.sd_rest:.2g} {unit}; measurement alone {found.sigma:.2g} {unit}",
+        *aligned(["", "name", "jumps", "effect", "sigma", ""], rows),
+    ]
+
+
 def aligned(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
     """A table as lines, numbers at the right."""
     cells = [[_text(cell) for cell in row] for row in rows]
@@ -41,7 +58,7 @@ def _rounded(value: float | None, sigma: float | None) -> tuple[float | None, fl
     if value is None or sigma is None or not math.isfinite(sigma):
         return _short(value), None
     places = decimals(sigma)
-    return round(value, places), round(sigma, places)
+    return round(value, places) + 0.0, round(sigma, places)  # + 0.0: no minus before a zero
 
 
 def _short(value: float | None) -> float | None:

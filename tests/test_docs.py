@@ -34,6 +34,7 @@ SOURCES = [
         "svev",
         "webpanel",
         "service",
+        "season",
         "analysis",
         "recorder",
         "photogrammetry",

@@ -10,6 +10,7 @@ import numpy as np
 from recorder.importing.flash import flashes
 from recorder.importing.image_folder import ImageFolder
 from recorder.importing.source import Film
+from recorder.importing.tiff_pages import ENDINGS, TiffPages
 from recorder.importing.video import Video
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
@@ -82,13 +83,19 @@ def opened(order: ImportOrder) -> list[Camera]:
             raise BadInputError(f"--start names {name}, and the cameras are {', '.join(names)}; correct it")
     cameras = []
     for name, path in order.cameras:
-        film: Film = ImageFolder(path) if path.is_dir() else Video(path, order.rate_hz)
+        film = _opened(path, order.rate_hz)
         cameras.append(Camera(name, film, film.bits if film.bits < BITS[-1] else order.bits or film.bits))
     if order.bits is not None and all(camera.film.bits < BITS[-1] for camera in cameras):
         raise BadInputError(f"--bits {order.bits} is for images of 16 bits, and none has so many; leave it out")
     if order.rig is not None:
         _check_sizes(cameras, order.rig[0])
     return cameras
+
+
+def _opened(path: Path, rate_hz: float) -> Film:
+    if path.is_dir():
+        return ImageFolder(path)
+    return TiffPages(path) if path.suffix.lower() in ENDINGS else Video(path, rate_hz)
 
 
 def pixels_of(cameras: Sequence[Camera]) -> Pixels:

@@ -11,7 +11,10 @@ import cv2
 import numpy as np
 
 from recorder.importing.grey import grey
+from recorder.importing.picture_dates import PictureDates
 from recorder.importing.source import Taken
+from recorder.importing.tiff_pages import ENDINGS as TIFF_ENDINGS
+from recorder.importing.tiff_tags import page_offsets
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
@@ -19,7 +22,7 @@ from rig.host.files import read_whole
 from rig.images.pixels import Stored
 
 #: Endings of the image files that are read.
-ENDINGS: Final = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp")
+ENDINGS: Final = (".png", *TIFF_ENDINGS, ".jpg", ".jpeg", ".bmp")
 _MOST_BYTES: Final = 1 << 30
 _DIGITS: Final = re.compile(r"(\d+)")
 
@@ -36,8 +39,6 @@ class ImageFolder:
     Raises:
         BadInputError: it holds no images, cannot be read, or two images have one number.
     """
-
-    date: UtcNs | None = None
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -59,7 +60,10 @@ class ImageFolder:
         self.kind = "folder of " + ", ".join(f"{count} {ending}" for ending, count in endings.items())
         self.first = numbers[0]
         lost = len(self._numbers) - len(names)
-        self.remarks = (f"numbers left out among its file names: {lost}; these frames are lost",) if lost else ()
+        dates = PictureDates(path / names[0], path / names[-1])
+        self.date: UtcNs | None = dates.begin
+        left_out = (f"numbers left out among its file names: {lost}; these frames are lost",) if lost else ()
+        self.remarks = left_out + dates.remarks
 
     @property
     def expected(self) -> int:
@@ -167,6 +171,10 @@ def _read(path: Path) -> Stored | None:
         return None
     if picture is None:
         return None
+    if len(pages := page_offsets(data)[0]) > 1:
+        raise BadInputError(
+            f"{path}: holds {len(pages)} pages: name the file itself as the film, or write each page as a file"
+        )
     try:
         return grey(picture)
     except ValueError as error:

@@ -27,7 +27,7 @@ def import_command(
         typer.Argument(
             metavar="FOLDER|VIDEO",
             show_default=False,
-            help="folder of images or video of each camera, from left to right; NAME=PATH names the camera",
+            help="folder of images, TIFF file or video of each camera, from left to right; NAME=PATH names the camera",
         ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="LOG", help="the new log", show_default=False)],
@@ -59,7 +59,8 @@ def import_command(
 ) -> None:
     """Make a log of image sequences or videos that other cameras took, so that films of other years can be measured.
 
-    A film is a folder of images (PNG, TIFF, JPEG, BMP; in the order of the numbers in their names) or a video. Frames
+    A film is a folder of images (PNG, TIFF, JPEG, BMP; in the order of the numbers in their names), a TIFF file with a
+    page for each frame, or a video. Frames
     of a folder have the numbers in the file names, where these differ in one number; others count from 1. The films
     begin together at their first frames, at those that --start names, or at a flash. Where a film has no more frames
     its camera is absent; an image that cannot be read, between two that can, is damaged; a number that is left out

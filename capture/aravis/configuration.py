@@ -36,7 +36,6 @@ _ONE: Final = ("1", "x1", "Off", "None")  # as an enumeration says that nothing 
 _NOT_REDUCED: Final = ("BinningHorizontal", "BinningVertical", "DecimationHorizontal", "DecimationVertical")
 #: Exposure and gain may differ so much from those wanted before that is said: steps of the sensor are smaller.
 _EXPOSURE_SHARE, _EXPOSURE_US, _GAIN_DB = 0.02, 20.0, 0.5
-_LEAST: Final = -1e9
 
 
 def configure(
@@ -67,7 +66,7 @@ def configure(
     _set_image(features, settings)
     notices += set_trigger(features, settings, software=software, action=action)
     notices += _set_exposure(features, settings.exposure_us)
-    notices += _set_gain(features, settings.gain_db)
+    notices += _set_gain(features, settings)
     return [f"camera {settings.name}: {notice}" for notice in notices]
 
 
@@ -139,14 +138,39 @@ def _set_exposure(features: Features, wanted_us: float) -> list[str]:
     return []
 
 
-def _set_gain(features: Features, wanted_db: float) -> list[str]:
+def _set_gain(features: Features, settings: CameraSettings) -> list[str]:
     features.choose("GainSelector", "All", "AnalogAll")
-    name = features.first_number("Gain", "GainAbs")
-    if name is None:
-        if features.set_number("GainRaw", _LEAST) is None or wanted_db == 0:
-            return [] if wanted_db == 0 else ["it has no gain"]
-        return ["its gain has no unit, so it is at its least: make images brighter by exposure_us"]
-    got = features.set_number(name, wanted_db)
-    if got is None or abs(got - wanted_db) > _GAIN_DB:
-        return [f"its gain is {'unknown' if got is None else f'{got:g} dB'}, not {wanted_db:g} dB"]
+    if settings.gain_raw is not None:
+        return _set_gain_steps(features, settings.gain_raw)
+    name, wanted_db = features.first_number("Gain", "GainAbs"), settings.gain_db
+    if name is not None:
+        got = features.set_number(name, wanted_db)
+        if got is None or abs(got - wanted_db) > _GAIN_DB:
+            return [f"its gain is {'unknown' if got is None else f'{got:g} dB'}, not {wanted_db:g} dB"]
+        return []
+    bounds = features.bounds("GainRaw")
+    if bounds is None:
+        return ["it has no gain"] if wanted_db else []
+    least, most, _ = bounds
+    if settings.gain_step_db is not None:
+        return _set_gain_steps(features, least + round(wanted_db / settings.gain_step_db))
+    notices = _set_gain_steps(features, least)
+    if wanted_db:
+        notices.append(
+            f"its gain has no unit (GainRaw, {least} to {most}), so it is at its least: set gain_raw, or gain_step_db "
+            "from its manual"
+        )
+    return notices
+
+
+def _set_gain_steps(features: Features, wanted: int) -> list[str]:
+    """Set the gain in the camera's own steps."""
+    bounds = features.bounds("GainRaw")
+    if bounds is None:
+        return ["it has no GainRaw, so gain_raw sets nothing: use gain_db"]
+    least, most, step = bounds
+    got = features.set_number("GainRaw", wanted)
+    got = features.number("GainRaw") if got is None else got
+    if got is None or abs(got - wanted) > step / 2:
+        return [f"its GainRaw is {'unknown' if got is None else f'{got:g}'}, not {wanted} (it takes {least} to {most})"]
     return []

@@ -64,6 +64,16 @@ class CameraSettings(StrictModel):
     )
     exposure_us: float = Field(2000.0, gt=0, le=1_000_000, description="exposure time, microseconds")
     gain_db: float = Field(0.0, ge=0, le=60, description="gain of the camera; more is brighter and noisier")
+    gain_step_db: float | None = Field(
+        None,
+        gt=0,
+        le=10,
+        description="aravis: gain_db of one step of GainRaw, for cameras that have their gain in steps alone; iidc has "
+        "one of its own",
+    )
+    gain_raw: int | None = Field(
+        None, ge=-(2**31), lt=2**31, description="aravis: GainRaw of the camera, in its own steps, instead of gain_db"
+    )
     trigger_input: str = Field("Line0", description="camera input that the trigger cable is plugged into")
     trigger_edge: Literal["rising", "falling"] = Field("rising", description="edge of the pulse that exposes")
     iidc: IidcSettings = Field(IidcSettings(), description="only for backend iidc")
@@ -82,6 +92,15 @@ class CameraSettings(StrictModel):
     def _address_where_needed(self) -> "CameraSettings":
         if self.backend != "sim" and not self.address:
             raise ValueError(f'backend "{self.backend}" needs an address: add address = "..."')
+        return self
+
+    @model_validator(mode="after")
+    def _one_gain(self) -> "CameraSettings":
+        if self.gain_raw is not None and self.gain_db:
+            raise ValueError(f"{self.name} has gain_raw and gain_db, which say the same: remove one of them")
+        for key in ("gain_raw", "gain_step_db"):
+            if getattr(self, key) is not None and self.backend != "aravis":
+                raise ValueError(f'{key} is for backend "aravis" only, {self.name} is "{self.backend}": remove it')
         return self
 
     @model_validator(mode="after")

@@ -81,6 +81,14 @@ def test_the_schema_is_a_schema() -> None:
             id="misspelt",
         ),
         pytest.param(
+            HEAD + REPLAYED + "gain_raw = 5\n",
+            '"cameras.1": gain_raw is for backend "aravis" only, K1 is "replay"',
+            id="steps of others",
+        ),
+        pytest.param(
+            HEAD + CAMERA + "gain_raw = 5\ngain_db = 1\n", '"cameras.1": K1 has gain_raw and gain_db', id="gain twice"
+        ),
+        pytest.param(
             HEAD + CAMERA + "[recorder]\nzzz = 1\n",
             'unknown key "recorder.zzz"; known keys here: directory, ',
             id="unknown",

@@ -147,6 +147,23 @@ def test_what_would_make_a_recording_wrong_is_refused_with_what_the_camera_has(
     assert told in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("made", "settings", "steps"),
+    [
+        (Maker.BASLER, {"gain_raw": 33}, 33),
+        (Maker.BASLER, {"gain_db": 6.0, "gain_step_db": 0.0359}, 167),
+        (Maker.PROSILICA, {"gain_db": 6.0, "gain_step_db": 1.0}, 6),
+    ],
+    indirect=["made"],
+)
+def test_gain_in_steps_alone_is_set_in_steps_or_by_what_a_step_is(
+    made: Made, settings: dict[str, object], steps: int
+) -> None:
+    with made.opened(**settings) as camera:
+        assert not [notice for notice in camera.notices() if "ain" in notice]
+        assert made.registers.number("GainRaw") == steps
+
+
 def test_a_camera_whose_exposure_mode_is_unknown_is_refused_with_what_is_true(
     tmp_path: Path, loopback: Loopback, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,7 +184,9 @@ def test_a_camera_whose_exposure_mode_is_unknown_is_refused_with_what_is_true(
             {"exposure_us": 2e6},
             ["input waits 50 us for a steady level", "it exposes 1e+06 us, not 2e+06"],
         ),
-        (Maker.BASLER, {"gain_db": 6.0}, ["input waits 10 us", "its gain has no unit, so it is at its least"]),
+        (Maker.BASLER, {"gain_db": 6.0}, ["input waits 10 us", "its gain has no unit (GainRaw, 0 to 500)"]),
+        (Maker.BASLER, {"gain_raw": 501}, ["input waits 10 us", "its GainRaw is 500, not 501 (it takes 0 to 500)"]),
+        (Maker.STANDARD, {"gain_raw": 5}, ["it has no GainRaw, so gain_raw sets nothing: use gain_db"]),
     ],
     indirect=["made"],
 )

@@ -24,8 +24,8 @@ class Desks:
     Args:
         find: gives the files of a recording.
         source: reads survey or poses; gives None if nobody named any.
-        busy: whether the computer has something better to do, such as a recording; what takes seconds is
-            refused then, or waits; None: nothing is recorded on this computer.
+        busy: whether the computer has something better to do, such as a recording: what takes seconds stands still
+            then; None: nothing is recorded on this computer.
     """
 
     def __init__(

@@ -19,9 +19,10 @@ from analysis.scene.static_image import StaticImage, static_images
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_pulses
 from rig.clocks import UtcNs
-from rig.errors import UnknownRecordingError
+from rig.errors import UnknownCameraError, UnknownRecordingError
 from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable, shown
+from rig.phrase import Phrase, phrase
 from rig.tag import CameraTag
 
 LETTERS: Final = {
@@ -30,6 +31,13 @@ LETTERS: Final = {
     FrameStatus.MISSED: "m",
     FrameStatus.DAMAGED: "d",
     FrameStatus.ABSENT: "a",
+}
+_FATES: Final = {
+    FrameStatus.OK: phrase("hand_frame_unreadable", "damaged in the file"),
+    FrameStatus.LOST: phrase("hand_frame_lost", "lost"),
+    FrameStatus.MISSED: phrase("hand_frame_missed", "missed"),
+    FrameStatus.DAMAGED: phrase("hand_frame_damaged", "damaged"),
+    FrameStatus.ABSENT: phrase("hand_frame_absent", "absent"),
 }
 #: So many pulses stay in memory: those around the one that is looked at.
 _KEPT: Final = 12
@@ -75,6 +83,41 @@ class OpenedLog:
         """The recording with its rate and cameras, and nothing measured."""
         return Measurements(self.facts.recording, self.facts.rate_hz, self.facts.cameras, ())
 
+    def index(self, pulse: int) -> int:
+        """The place of a pulse among those of the log.
+
+        Raises:
+            UnknownRecordingError: the log has no such pulse.
+        """
+        at = bisect_left(self.pulses, pulse)
+        if at == len(self.pulses) or self.pulses[at] != pulse:
+            raise UnknownRecordingError(
+                phrase(
+                    "hand_no_pulse",
+                    "the log has no pulse {pulse}: it goes from {first} to {last}",
+                    pulse=pulse,
+                    first=self.pulses[0],
+                    last=self.pulses[-1],
+                )
+            )
+        return at
+
+    def require_camera(self, name: str) -> None:
+        """Refuse a camera that is none of the log.
+
+        Raises:
+            UnknownCameraError: the log has no such camera.
+        """
+        if name not in self.facts.cameras:
+            raise UnknownCameraError(
+                phrase(
+                    "hand_no_camera",
+                    "the log has no camera {camera}: choose among {cameras}",
+                    camera=name,
+                    cameras=", ".join(self.facts.cameras),
+                )
+            )
+
     def frames(self, pulse: int) -> Mapping[str, Grey]:
         """The frames of a pulse by camera, grey values to measure in; those that are not there are left out."""
         return self._read(pulse)[0]
@@ -84,9 +127,11 @@ class OpenedLog:
 
         Raises:
             NoFrameError: there is none.
+            UnknownRecordingError, UnknownCameraError: the log has no such pulse or camera.
         """
         frames = self._read(pulse)[0]
         if camera not in frames:
+            self.require_camera(camera)
             raise NoFrameError(self._why_none(pulse, camera))
         return frames[camera]
 
@@ -100,9 +145,11 @@ class OpenedLog:
 
         Raises:
             NoFrameError: there is none.
+            UnknownRecordingError, UnknownCameraError: the log has no such pulse or camera.
         """
         grey, pictures = self._read(pulse)
         if camera not in pictures:
+            self.require_camera(camera)
             raise NoFrameError(self._why_none(pulse, camera))
         picture = pictures[camera]
         if difference:
@@ -155,16 +202,16 @@ class OpenedLog:
                 self._frames.popitem(last=False)
             return found
 
-    def _why_none(self, pulse: int, camera: str) -> str:
-        if camera not in self.status:
-            return f"the log has no camera {camera}: choose among {', '.join(self.status)}"
-        if pulse not in self.times:
-            return f"the log has no pulse {pulse}: it goes from {self.pulses[0]} to {self.pulses[-1]}"
-        letter = self.status[camera][self.pulses.index(pulse)]
-        what = next(status.value for status, known in LETTERS.items() if known == letter)
-        if what == FrameStatus.OK.value:
-            what = "damaged in the file"
-        return f"the frame of {camera} at pulse {pulse} is {what}: measure in another pulse"
+    def _why_none(self, pulse: int, camera: str) -> Phrase:
+        letter = self.status[camera][self.index(pulse)]
+        fate = next(status for status, known in LETTERS.items() if known == letter)
+        return phrase(
+            "hand_no_frame",
+            "the frame of {camera} at pulse {pulse} is {fate}: measure in another pulse",
+            camera=camera,
+            pulse=pulse,
+            fate=_FATES[fate],
+        )
 
 
 def _letter(cameras: tuple[CameraTag, ...], name: str) -> str:

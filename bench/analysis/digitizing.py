@@ -18,7 +18,7 @@ import httpx
 import msgspec
 import numpy as np
 
-from analysis.digitizing.journal import FORMAT, SUFFIX, Entered, Entry, Key
+from analysis.digitizing.marks.journal import FORMAT, SUFFIX, Entered, Entry, Key
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from bench.recording.processes import cpu_seconds
 from recorder.reading.info import info

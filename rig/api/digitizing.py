@@ -323,12 +323,15 @@ class TrackOrder(Model):
     ] = 30
 
 
-class Tracked(Model):
-    """What was followed."""
+class Tracking(Model):
+    """How far the following of things is, and what it gave."""
 
-    revision: int
-    tracked: dict[str, list[int]] = Field(description="by thing, the pulses")
-    stopped: dict[str, str] = Field(description="by thing, why it ended")
+    state: Literal["none", "tracking", "done", "failed"]
+    share: float = Field(0.0, description="about how much is done, 0 to 1")
+    paused: bool = Field(False, description="it stands still while a recording runs")
+    problem: Phrase | None = Field(None, description="why nothing was followed, and what to do")
+    tracked: dict[str, list[int]] = Field({}, description="by thing, the pulses")
+    stopped: dict[str, Phrase] = Field({}, description="by thing, why it ended")
 
 
 class Suggestion(Model):

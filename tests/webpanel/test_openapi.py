@@ -67,6 +67,8 @@ CALLS = {
     "POST /api/recordings/{recording_id}/digitizing/refine",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/next",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/track",
+    "DELETE /api/recordings/{recording_id}/digitizing/sessions/{operator}/track",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/track",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/export/{name}",
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/compute",
     "DELETE /api/recordings/{recording_id}/digitizing/sessions/{operator}/compute",

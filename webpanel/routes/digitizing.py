@@ -28,7 +28,7 @@ from rig.api.digitizing import (
     SessionView,
     Suggestion,
     TapeOrder,
-    Tracked,
+    Tracking,
     TrackOrder,
 )
 from webpanel.door.streams import Streams
@@ -104,7 +104,7 @@ def digitizing_router(desks: Desks, streams: Streams) -> APIRouter:
         _: NoFields = None,
     ) -> OrientationState:
         """Orient the cameras again, by the balls that the images show by themselves or that an operator clicked."""
-        return desk.orient(operator)
+        return desk.programs.orient(operator)
 
     @router.get(base + "/frames/{pulse}/{camera}.png", response_class=Response, responses=_PNG | refusals(404))
     def get_frame(
@@ -135,9 +135,9 @@ def digitizing_router(desks: Desks, streams: Streams) -> APIRouter:
     @router.post(base + "/refine", responses=CHANGING | refusals(404))
     def refine_place(desk: AtDesk, order: RefineOrder) -> Refined:
         """Find the disc or edge near a click to a part of a pixel, with its sigma; 422 says why there is none."""
-        from analysis.digitizing.following import refined  # noqa: PLC0415 - loaded with the first desk
+        from analysis.digitizing.refining.click import refined  # noqa: PLC0415 - loaded with the first desk
 
-        return refined(desk, order)
+        return refined(desk.log.frame(order.pulse, order.camera), order)
 
     @router.get(base + "/repeatability", responses=refusals(404))
     def compare_operators(
@@ -195,12 +195,20 @@ def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str, s
             if found.revision > since or streams.ending or left_s <= 0:
                 return found
 
-    @router.post(base + "/track", responses=CHANGING | refusals(404))
-    def track_things(desk: AtDesk, operator: Operator, order: TrackOrder) -> Tracked:
+    @router.post(base + "/track", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404))
+    def track_things(desk: AtDesk, operator: Operator, order: TrackOrder) -> Tracking:
         """Follow things through the images from where they are marked; one undo takes all back."""
-        from analysis.digitizing.following import follow  # noqa: PLC0415 - loaded with the first desk
+        return desk.programs.follow(operator, order)
 
-        return follow(desk, operator, order)
+    @router.delete(base + "/track", responses=CHANGING | refusals(404))
+    def cancel_tracking(desk: AtDesk, operator: Operator) -> Tracking:
+        """Follow no further, and keep nothing of it."""
+        return desk.programs.follower.cancel(operator)
+
+    @router.get(base + "/track", responses=refusals(404))
+    def get_tracking(desk: AtDesk, operator: Operator) -> Tracking:
+        """How far the following is, and what it gave."""
+        return desk.programs.follower.state(operator)
 
 
 def _add_results(router: APIRouter, opened: Callable[[str], Desk], base: str) -> None:
@@ -226,22 +234,22 @@ def _add_results(router: APIRouter, opened: Callable[[str], Desk], base: str) ->
     @router.post(base + "/compute", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404))
     def compute(desk: AtDesk, operator: Operator, _: NoFields = None) -> HandResult:
         """Compute the jump from what was measured by hand, with the rest of the automatic measurement."""
-        return desk.compute(operator)
+        return desk.programs.compute(operator)
 
     @router.delete(base + "/compute", responses=CHANGING | refusals(404))
     def cancel_computing(desk: AtDesk, operator: Operator) -> HandResult:
         """Compute no further; an earlier result stays."""
-        return desk.computing.cancel(operator)
+        return desk.programs.computing.cancel(operator)
 
     @router.get(base + "/result", responses=refusals(404))
     def get_result(desk: AtDesk, operator: Operator) -> HandResult:
         """How far the computing is, and what it gave."""
-        return desk.computing.result(operator)
+        return desk.programs.computing.result(operator)
 
     @router.get(base + "/result/files/{name}", response_class=FileResponse, responses=_FILE | refusals(404))
     def get_result_file(desk: AtDesk, operator: Operator, name: FileName) -> FileResponse:
         """A file of the result, such as `report.html`."""
-        file = desk.computing.file(operator, name)
+        file = desk.programs.computing.file(operator, name)
         if file is None:
             text = f"there is no file {name} of {operator}: compute first"
             raise ProblemError(HTTPStatus.NOT_FOUND, "unknown_file", text)
@@ -253,12 +261,12 @@ def _add_results(router: APIRouter, opened: Callable[[str], Desk], base: str) ->
 
 
 def _delivered(desk: Desk, operator: str, name: str) -> bytes:
-    from analysis.digitizing.delivery import delivered  # noqa: PLC0415 - loaded with the first desk
+    from analysis.digitizing.exchange.delivery import delivered  # noqa: PLC0415 - loaded with the first desk
 
     return delivered(desk, operator, name)
 
 
 def _taken_in(desk: Desk, operator: str, name: str, content: bytes) -> Changed:
-    from analysis.digitizing.delivery import taken_in  # noqa: PLC0415 - loaded with the first desk
+    from analysis.digitizing.exchange.delivery import taken_in  # noqa: PLC0415 - loaded with the first desk
 
     return taken_in(desk, operator, name, content)

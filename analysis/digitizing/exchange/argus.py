@@ -26,7 +26,7 @@ from analysis.digitizing.exchange.dlt import coefficients
 from analysis.digitizing.exchange.space import all_oriented, xyz_of
 from analysis.digitizing.exchange.tables import read_matrix, table
 from analysis.digitizing.exchange.tracks import Tracks, tracks_of
-from analysis.digitizing.journal import Entered, Key
+from analysis.digitizing.marks.journal import Entered, Key
 from analysis.export.camera_calibration import plumb_bob, project
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.camera_model import INTERIOR

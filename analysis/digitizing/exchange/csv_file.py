@@ -8,8 +8,8 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from analysis.digitizing.journal import Entered, Key
-from analysis.digitizing.things import is_line
+from analysis.digitizing.marks.journal import Entered, Key
+from analysis.digitizing.marks.things import is_line
 from photogrammetry.exchange.dialect import Row, read_rows, with_points
 from rig.api.digitizing import Mark, MarkState
 from rig.errors import BadInputError

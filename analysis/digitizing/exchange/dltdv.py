@@ -28,7 +28,7 @@ from analysis.digitizing.exchange.dlt import camera_matrix, coefficients, distor
 from analysis.digitizing.exchange.space import all_oriented, xyz_of
 from analysis.digitizing.exchange.tables import read_matrix, table
 from analysis.digitizing.exchange.tracks import Tracks, tracks_of
-from analysis.digitizing.journal import Entered, Key
+from analysis.digitizing.marks.journal import Entered, Key
 from analysis.scene.camera_system import CameraSystem
 from rig.errors import BadInputError
 

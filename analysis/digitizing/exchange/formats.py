@@ -11,7 +11,7 @@ from typing import Final
 from analysis.digitizing.exchange.argus import argus_files, read_argus
 from analysis.digitizing.exchange.csv_file import csv_of, read_csv
 from analysis.digitizing.exchange.dltdv import dltdv_files, read_dltdv
-from analysis.digitizing.journal import Entered, Key
+from analysis.digitizing.marks.journal import Entered, Key
 from analysis.scene.camera_system import CameraSystem
 from rig.errors import BadInputError
 from rig.host.files import TEXT_MAX

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.digitizing.effective import covariance_of
 from analysis.digitizing.exchange.tracks import Tracks
-from analysis.digitizing.journal import Entered
-from analysis.digitizing.space import Ray, intersected, space_points
+from analysis.digitizing.geometry.space import Ray, intersected, space_points
+from analysis.digitizing.marks.effective import covariance_of
+from analysis.digitizing.marks.journal import Entered
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Floats
 

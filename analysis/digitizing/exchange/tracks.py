@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 from pydantic import ValidationError
 
-from analysis.digitizing.journal import Entered, Key
-from analysis.digitizing.things import is_line
+from analysis.digitizing.marks.journal import Entered, Key
+from analysis.digitizing.marks.things import is_line
 from rig.api.digitizing import Mark, MarkState
 from rig.arrays import Floats
 from rig.errors import BadInputError

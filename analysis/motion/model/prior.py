@@ -43,6 +43,10 @@ def start_densities() -> Floats:
     return np.asarray(_GAIN**2 / _WITHIN_S)
 
 
+#: Density of the jerk's noise of the liveliest part of a jumper, at the edge, m^2/s^5.
+LIVELIEST: Final = float(start_densities().max())
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
     """The motion between n pulses; of g possible times of the take-off, see `prior`.

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from analysis.digitizing.desk import Desk
-from analysis.digitizing.orienting import Orienting
+from analysis.digitizing.programs.orienting import Orienting
 from bench.analysis.hill_logs import HillLog
-from tests.analysis.digitizing.hill import opened, write_jump
+from tests.analysis.digitizing.hill import adopt, opened, write_jump
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +30,7 @@ def jump(rendered: HillLog, tmp_path: Path) -> HillLog:
 def orientation(rendered: HillLog) -> Iterator[Orienting]:
     """The cameras, oriented once."""
     desk = opened(rendered)
-    yield desk.orienting
+    yield desk.programs.orienting
     desk.close()
 
 
@@ -38,6 +38,6 @@ def orientation(rendered: HillLog) -> Iterator[Orienting]:
 def desk(jump: HillLog, orientation: Orienting) -> Iterator[Desk]:
     """The desk at which it is measured."""
     desk = opened(jump, survey=False)
-    desk.orienting._known, desk.orienting._given = orientation._known, orientation._given
+    adopt(desk, orientation)
     yield desk
     desk.close()

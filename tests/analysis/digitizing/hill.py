@@ -9,9 +9,10 @@ import numpy as np
 from analysis.cameras.source import read_source
 from analysis.digitizing.desk import Desk
 from analysis.digitizing.files import DeskFiles
+from analysis.digitizing.programs.orienting import Orienting
 from analysis.measurements.model import POINTS
 from bench.analysis.hill_logs import HillLog, write_hill_log
-from rig.api.digitizing import PlaceAction
+from rig.api.digitizing import PlaceAction, Tracking, TrackOrder
 from simrig.world.conditions.effects import MissingMarker
 from simrig.world.scenario import load_scenario
 
@@ -56,8 +57,22 @@ def opened(log: HillLog, *, survey: bool = True) -> Desk:
     source = read_source(log.survey, None) if survey else None
     files = DeskFiles(log.path, log.path.with_suffix(".digitized"), log.path.with_suffix(".measured"))
     desk = Desk(files, lambda: source)
-    desk.orienting.wait(60)
+    desk.programs.orienting.wait(60)
     return desk
+
+
+def adopt(desk: Desk, orientation: Orienting) -> None:
+    """Let a desk have cameras that were oriented before."""
+    desk.programs.orienting._errands.adopt("", orientation._known)
+    desk.programs.orienting._given = orientation._given
+
+
+def followed(desk: Desk, operator: str, order: TrackOrder) -> Tracking:
+    """Follow to the end."""
+    desk.programs.follow(operator, order)
+    told = desk.programs.follower.wait(operator, 120)
+    assert told.state == "done", told.problem
+    return told
 
 
 def clicks(desk: Desk, log: HillLog, seed: int, pulses: range = MEASURED, *, markers: bool = True) -> Iterator[Click]:
@@ -68,7 +83,7 @@ def clicks(desk: Desk, log: HillLog, seed: int, pulses: range = MEASURED, *, mar
     random = np.random.default_rng(seed)
     for pulse in pulses:
         truth = log.truth[pulse]
-        for camera in desk.oriented().cameras.values():
+        for camera in desk.programs.oriented().cameras.values():
             for thing, xyz, seen in _things(truth, camera.name):
                 px = camera.project(np.array(xyz))
                 if (seen or not markers) and np.isfinite(px).all() and (px > 0).all() and (px < camera.size - 1).all():

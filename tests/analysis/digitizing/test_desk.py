@@ -9,17 +9,16 @@ import pytest
 
 from analysis.cameras.source import read_source
 from analysis.digitizing.desk import Desk
-from analysis.digitizing.epipolar import epipolar_curves
 from analysis.digitizing.files import DeskFiles
-from analysis.digitizing.following import follow
-from analysis.digitizing.journal import Entered, Key
+from analysis.digitizing.geometry.epipolar import epipolar_curves
+from analysis.digitizing.marks.journal import Entered, Key
 from analysis.measurements.file import write_measurements
 from analysis.scene.camera_system import CameraSystem
 from bench.analysis.hill_logs import HillLog
 from photogrammetry.geometry.camera_model import INTERIOR
 from rig.api.digitizing import PlaceAction, StateAction, TapeOrder, TrackOrder, UndoAction
 from rig.errors import BadInputError, StateForbidsError
-from tests.analysis.digitizing.hill import MEASURED, clicks, opened
+from tests.analysis.digitizing.hill import MEASURED, adopt, clicks, opened
 from tests.support.waiting import wait_until
 
 
@@ -47,12 +46,12 @@ def test_points_skis_and_angles_that_were_clicked_are_true(desk: Desk, jump: Hil
 
 
 def _computed_angles_are_true(desk: Desk, jump: HillLog) -> bool:
-    desk.compute("Anna")
-    wait_until(lambda: desk.computing.result("Anna").state != "computing", "the jump is computed", 60)
-    result = desk.computing.result("Anna")
+    desk.programs.compute("Anna")
+    wait_until(lambda: desk.programs.computing.result("Anna").state != "computing", "the jump is computed", 60)
+    result = desk.programs.computing.result("Anna")
     assert result.state == "done", result.problem
     assert "report.html" in result.files
-    found = desk.computing.file("Anna", "jumper.json")
+    found = desk.programs.computing.file("Anna", "jumper.json")
     assert found is not None
     statuses = {
         point["status"]
@@ -110,14 +109,14 @@ def test_a_view_is_the_same_whatever_was_computed_before(desk: Desk, jump: HillL
     assert undone is not None
     assert undone.model_copy(update={"revision": before.revision}) == before
     anew = opened(jump, survey=False)
-    anew.orienting._known = desk.orienting._known
+    adopt(anew, desk.programs.orienting)
     desk.close()
     assert anew.view("Anna", 20) == undone
     anew.close()
 
 
 def test_epipolar_curves_meet_the_truth_also_where_lenses_distort(desk: Desk, jump: HillLog) -> None:
-    system = desk.oriented()
+    system = desk.programs.oriented()
     system = _distorted(system)
     truth = jump.truth[20]["points"]
     for xyz in truth.values():
@@ -177,7 +176,7 @@ def test_the_next_click_is_where_a_third_ray_is_missing(desk: Desk, jump: HillLo
     assert len(rays) < 3
     before = _trace(desk, told.pulse, told.thing)
     truth = np.array(jump.truth[told.pulse]["points"][told.thing])
-    x, y = desk.oriented()[told.camera].project(truth)
+    x, y = desk.programs.oriented()[told.camera].project(truth)
     desk.act("Anna", PlaceAction(do="place", pulse=told.pulse, camera=told.camera, thing=told.thing, xy=(x, y)))
     assert _trace(desk, told.pulse, told.thing) < before
     assert desk.suggestion("Anna") != told
@@ -189,7 +188,7 @@ def _trace(desk: Desk, pulse: int, thing: str) -> float:
 
 
 def test_a_tape_gives_a_length_with_its_sigma(desk: Desk, jump: HillLog) -> None:
-    system, points = desk.oriented(), jump.truth[20]["points"]
+    system, points = desk.programs.oriented(), jump.truth[20]["points"]
     ends = {
         end: {name: tuple(camera.project(np.array(points[thing]))) for name, camera in system.cameras.items()}
         for end, thing in (("from", "P1"), ("to", "P2"))
@@ -207,11 +206,11 @@ def test_fifty_times_undo_and_redo_leave_the_measurements_as_they_were(
     for click in clicks(desk, jump, 7, range(12, 18)):
         desk.act("Anna", click.action())
     desk.act("Anna", StateAction(do="state", pulse=12, camera="K1", thing="P2", state="hidden"))
-    write_measurements(desk.measurements("Anna"), tmp_path / "before.json")
+    write_measurements(desk.programs.measurements("Anna"), tmp_path / "before.json")
     for do in ("undo", "redo"):
         for _ in range(50):
             assert desk.act("Anna", UndoAction(do=do)).touched is not None
-    write_measurements(desk.measurements("Anna"), tmp_path / "after.json")
+    write_measurements(desk.programs.measurements("Anna"), tmp_path / "after.json")
     assert (tmp_path / "after.json").read_bytes() == (tmp_path / "before.json").read_bytes()
     assert (tmp_path / "before.json").stat().st_size > 1000
 
@@ -228,7 +227,7 @@ def test_without_a_survey_images_are_measured_and_nothing_in_space(jump: HillLog
     with pytest.raises(StateForbidsError, match="not oriented"):
         desk.geometry("Anna", 20, "K1", "P1", (10, 20))
     with pytest.raises(StateForbidsError, match="nothing can be computed in space"):
-        desk.compute("Anna")
+        desk.programs.compute("Anna")
     desk.close()
 
 
@@ -239,24 +238,27 @@ def test_nothing_takes_the_computer_from_a_recording(jump: HillLog) -> None:
     desk = Desk(files, lambda: source, lambda: recording)
     said = "a recording runs: the cameras are oriented when it has ended"
     wait_until(lambda: str(desk.opening().orientation.message) == said, "orienting stands still", 20)
-    with pytest.raises(StateForbidsError, match="a recording runs"):
-        follow(desk, "Anna", TrackOrder(things=["P1"], pulse=20, direction=1))
     changed = desk.act("Anna", PlaceAction(do="place", pulse=20, camera="K1", thing="P1", xy=(10, 20)))
     assert changed.view is not None
     assert changed.view.space == {}
+    assert desk.programs.follow("Anna", TrackOrder(things=["P1"], pulse=20, direction=1, most=2)).state == "tracking"
+    wait_until(lambda: desk.programs.follower.state("Anna").paused, "following stands still", 20)
     recording = False
     wait_until(lambda: desk.opening().orientation.state == "done", "the cameras are oriented", 60)
+    told = desk.programs.follower.wait("Anna", 60)
+    assert told.tracked == {"P1": []}  # nothing stands out where it was marked
+    assert str(told.stopped["P1"]) == "it was tracked as far as was asked"
     desk.close()
 
 
 def test_clicked_balls_orient_the_cameras(jump: HillLog) -> None:
     desk = opened(jump)
-    true = desk.oriented()
-    balls = desk.orienting.balls
+    true = desk.programs.oriented()
+    balls = desk.programs.orienting.balls
     assert balls is not None
-    desk.orient("Bo")
-    wait_until(lambda: desk.orienting.state.state != "working", "nobody clicked a ball", 30)
-    assert "an image needs 4 clicked balls or more" in str(desk.orienting.state.message)
+    desk.programs.orient("Bo")
+    wait_until(lambda: desk.programs.orienting.state.state != "working", "nobody clicked a ball", 30)
+    assert "an image needs 4 clicked balls or more" in str(desk.programs.orienting.state.message)
     random = np.random.default_rng(8)
     for name, camera in true.cameras.items():
         for ball, xyz in zip(balls.names, balls.xyz, strict=True):
@@ -267,10 +269,10 @@ def test_clicked_balls_orient_the_cameras(jump: HillLog) -> None:
                     do="place", pulse=1, camera=name, thing=f"ball:{ball}", xy=(x, y), sigma=(0.2, 0.2)
                 )
                 desk.act("Bo", action)
-    desk.orient("Bo")
-    wait_until(lambda: desk.orienting.state.state != "working", "the cameras are oriented", 60)
-    assert desk.orienting.state.state == "done", desk.orienting.state
-    found = desk.oriented()
+    desk.programs.orient("Bo")
+    wait_until(lambda: desk.programs.orienting.state.state != "working", "the cameras are oriented", 60)
+    assert desk.programs.orienting.state.state == "done", desk.programs.orienting.state
+    found = desk.programs.oriented()
     for name, camera in found.cameras.items():
         sigma = np.sqrt(np.diagonal(found.covariance)[camera.columns[:3]])
         assert (np.abs(camera.position - true[name].position) < 5 * np.maximum(sigma, 0.02)).all()

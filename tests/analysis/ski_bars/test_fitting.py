@@ -9,7 +9,7 @@ from analysis.ski_bars.bars import ExpectedBars, Poses
 from analysis.ski_bars.fitting import FittedBars, fit_bars
 from analysis.ski_bars.pixels import SkiView
 from bench.analysis.simulated import true_cameras
-from tests.analysis.digitizing.tracking.tracked_hill import NAMES, TrackedHill, hill
+from tests.analysis.digitizing.following.tracked_hill import NAMES, TrackedHill, hill
 
 SYSTEM = true_cameras()
 SIGMA = np.tile((0.03, 0.03, 0.03, 0.02, 0.02), 2)

@@ -4,14 +4,14 @@ import { chooseLanguage, languageInUse, t } from "../i18n/i18n.js";
 import { $, make } from "../shared/dom.js";
 import { clearSnacks } from "../shared/snacks.js";
 import { load, save } from "../shared/store.js";
-import { accept, BY_HAND, nudge, remove, setSigma, setState, stepCamera, stepThing, target, toggleGuess } from "./marking.js";
-import { centre, moveCrosshair, pan, placeAtCrosshair, showWhole, zoomIn, zoomOut } from "./panes.js";
-import { spreadTone } from "./picture.js";
-import { stepPulse, toEnd, toGap, togglePlay, toNext, toOpen, toWorst } from "./pulses.js";
-import { takeBack } from "./session.js";
-import { change, state } from "./state.js";
-import { toggleTape } from "./tape.js";
-import { follow, refineHere, toEndOfRun } from "./tracking.js";
+import { stepPulse, toEnd, toGap, togglePlay, toNext, toOpen, toWorst } from "./cards/pulses.js";
+import { follow, refineHere, toEndOfRun } from "./cards/tracking.js";
+import { accept, BY_HAND, nudge, remove, setSigma, setState, stepCamera, stepThing, target, toggleGuess } from "./marking/marking.js";
+import { toggleTape } from "./marking/tape.js";
+import { takeBack } from "./session/session.js";
+import { change, state } from "./session/state.js";
+import { centre, moveCrosshair, pan, placeAtCrosshair, showWhole, zoomIn, zoomOut } from "./views/panes.js";
+import { spreadTone } from "./views/picture.js";
 
 /** A nudge, and one with the Shift key, px of the image. */
 const [NUDGE, LARGE_NUDGE] = [0.1, 1];

@@ -140,10 +140,13 @@
  * @property {Place} xy
  * @property {[number, number]} sigma
  * @property {string} kind
- * @typedef {object} Tracked
- * @property {number} revision
+ * @typedef {object} Tracking
+ * @property {"none"|"tracking"|"done"|"failed"} state
+ * @property {number} share
+ * @property {boolean} paused
+ * @property {Phrase|null} problem
  * @property {Record<string, number[]>} tracked
- * @property {Record<string, string>} stopped
+ * @property {Record<string, Phrase>} stopped
  * @typedef {object} Suggestion
  * @property {number} pulse
  * @property {string} camera

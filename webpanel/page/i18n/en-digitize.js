@@ -120,7 +120,6 @@ export const digitize = {
   "digitize.track_on": "Track on",
   "digitize.track_end": "End of the run",
   "digitize.track_nothing": "Measure something in this pulse first.",
-  "digitize.track_whole": "all of them",
   "digitize.tracked": "{thing}: {count} pulses; {why}",
   "digitize.tracking": "Tracking …",
   "digitize.orientation": "Orientation",

@@ -120,7 +120,6 @@ export const digitize = {
   "digitize.track_on": "Følg framover",
   "digitize.track_end": "Enden av det fulgte",
   "digitize.track_nothing": "Mål noe i denne pulsen først.",
-  "digitize.track_whole": "alle sammen",
   "digitize.tracked": "{thing}: {count} pulser; {why}",
   "digitize.tracking": "Følger …",
   "digitize.orientation": "Orientering",

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from analysis.digitizing.exchange.csv_file import csv_of, read_csv
-from analysis.digitizing.journal import Entered, Key
+from analysis.digitizing.marks.journal import Entered, Key
 from rig.api.digitizing import MarkSource, MarkState
 from rig.errors import BadInputError
 

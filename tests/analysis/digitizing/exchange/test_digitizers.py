@@ -13,7 +13,7 @@ import pytest
 from analysis.digitizing.exchange.argus import argus_files, read_argus
 from analysis.digitizing.exchange.dltdv import dltdv_files, read_dltdv
 from analysis.digitizing.exchange.formats import NAMES, exported, imported
-from analysis.digitizing.journal import Entered, Key
+from analysis.digitizing.marks.journal import Entered, Key
 from analysis.scene.camera_system import CameraSystem
 from photogrammetry.geometry.camera_model import Distortion
 from rig.api.digitizing import MarkState

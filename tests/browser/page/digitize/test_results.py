@@ -24,10 +24,17 @@ def _mark(desk: Desk, camera: str, thing: str, xy: np.ndarray, pulse: int = PULS
 
 def test_what_the_service_says_is_in_the_language_of_the_page(desk: Desk, open_page: Open) -> None:
     for camera in CAMERAS:
+        _mark(desk, camera, "P1", desk.true(camera, "P1"))
         _mark(desk, camera, "P3", desk.true(camera, "P3") + (8, 40) * np.array(camera == "K2"))
     page = enter(open_page, desk, locale="nb-NO")
     expect(page.locator("#findings")).to_have_text(re.compile(r"^P3 i K2 passer ikke: \d+(,\d)? px, w = \d+(,\d)?$"))
     expect(page.locator('[data-of="P3"] .misfit')).to_contain_text("passer ikke")
+    page.keyboard.press("2")
+    expect(page.locator("#track-state")).to_contain_text("motsier hverandre eller dem fra før", timeout=30_000)
+    page.locator("#track-what").select_option("one")
+    page.locator("#track-on").click()
+    said = "P1 hjelm: 10 pulser; puls 21: loggen slutter"
+    expect(page.locator("#track-said li")).to_have_text(said, timeout=30_000)
     page.locator("#orient-clicked").click()
     expect(page.locator("#orientation-message")).to_contain_text("et bilde trenger 4 klikkede baller eller flere")
 

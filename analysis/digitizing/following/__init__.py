@@ -1,0 +1,1 @@
+"""What was marked, followed through the pulses."""

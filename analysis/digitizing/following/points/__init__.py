@@ -1,0 +1,1 @@
+"""Points, followed by their appearance."""

@@ -1,0 +1,1 @@
+"""Skis, followed as bars in space."""

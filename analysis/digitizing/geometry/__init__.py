@@ -1,0 +1,1 @@
+"""What follows from marks in space, while they are made."""

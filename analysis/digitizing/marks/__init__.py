@@ -1,0 +1,1 @@
+"""What operators said of the images, kept."""

@@ -1,0 +1,1 @@
+"""Long work for the operators of a log, each done by a program beside the service."""

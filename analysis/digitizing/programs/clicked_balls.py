@@ -1,0 +1,90 @@
+"""Orients cameras by the balls that a person clicked, and by nothing else (paper, step 2, alternative 1)."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from analysis.cameras.source import Source
+from analysis.digitizing.marks.effective import sigma_of
+from analysis.digitizing.marks.journal import Entered, Key
+from analysis.digitizing.marks.things import ball_of
+from analysis.scene.camera_system import CameraSystem, camera_system
+from analysis.scene.survey import Survey
+from photogrammetry.network.file import pixel_to_metric
+from photogrammetry.network.model import Image, ImageObservations
+from photogrammetry.procedures.orientation import orient
+from rig.api.digitizing import MarkState
+from rig.errors import BadInputError
+from rig.phrase import phrase
+
+#: Clicked balls without which a camera is left out.
+_FEWEST_BALLS: Final = 4
+
+
+def orient_by_clicks(
+    sizes: Mapping[str, tuple[int, int]], source: Source, marks: Mapping[Key, Entered]
+) -> tuple[CameraSystem, list[str]]:
+    """Orient the cameras in whose images enough balls were clicked.
+
+    Args:
+        sizes: width and height of the images by camera, px.
+        source: the survey of the balls.
+        marks: the clicked balls; other marks are left out.
+
+    Returns:
+        The cameras, and what a person should know, one line each.
+
+    Raises:
+        BadInputError: poses are given and no survey, or too few balls were clicked.
+        NotSolvableError, NotConvergedError, RefusedError: of the adjustment.
+    """
+    if not isinstance(source, Survey):
+        raise BadInputError(
+            phrase(
+                "hand_poses_given",
+                "the cameras' poses are given: to orient by clicked balls, give the survey of the balls",
+            )
+        )
+    network = source.network
+    names = {point.name: i for i, point in enumerate(network.points)}
+    placed, _ = source.cameras_of(sizes)
+    clicked: dict[str, dict[str, Entered]] = {name: {} for name in placed}
+    for key, entered in marks.items():
+        ball = ball_of(key.thing)
+        if ball in names and key.camera in clicked and entered.state is MarkState.MEASURED and entered.xy:
+            clicked[key.camera][ball] = entered
+    used = [name for name, balls in clicked.items() if len(balls) >= _FEWEST_BALLS]
+    if not used:
+        most = max((len(balls) for balls in clicked.values()), default=0)
+        raise BadInputError(
+            phrase(
+                "hand_few_balls",
+                "an image needs {fewest} clicked balls or more, five to be sure; most have {most}",
+                fewest=_FEWEST_BALLS,
+                most=most,
+            )
+        )
+    seen = sorted({ball for name in used for ball in clicked[name]}, key=names.__getitem__)
+    rows = [(i, seen.index(ball), entered) for i, name in enumerate(used) for ball, entered in clicked[name].items()]
+    size = np.array([sizes[used[i]] for i, _, _ in rows], float)
+    xy = np.array([entered.xy for _, _, entered in rows], float)
+    observations = ImageObservations(
+        np.array([i for i, _, _ in rows], np.intp),
+        np.array([p for _, p, _ in rows], np.intp),
+        np.stack([pixel_to_metric(place, s) for place, s in zip(xy, size, strict=True)]),
+        np.array([sigma_of(entered) for _, _, entered in rows], float),
+        np.zeros(len(rows), np.intp),
+    )
+    chosen = replace(
+        network,
+        cameras=tuple(placed[name] for name in used),
+        images=tuple(Image(name, i) for i, name in enumerate(used)),
+        points=tuple(network.points[names[ball]] for ball in seen),
+        observations=observations,
+        distances=(),
+        differences=(),
+    )
+    orientation = orient(chosen, uncertain_interior=True)
+    return camera_system(orientation, tuple(sizes)), list(orientation.notes)

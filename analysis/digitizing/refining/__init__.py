@@ -1,0 +1,1 @@
+"""A click, found more exactly in its image."""

@@ -22,6 +22,7 @@ from rig.clocks import NS_PER_US
 from rig.frame import FrameStatus
 from rig.host.disk import free_bytes
 from rig.host.endings import Asks, heed
+from rig.host.interfaces import interface_to
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.tag import TripletTag
@@ -32,7 +33,6 @@ from svev.doctor.cameras.exposure import exposes_on
 from svev.doctor.disk import look_at_disk
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.doctor.network import gige_cameras, look_at_interfaces
-from svev.gige.interfaces import interface_to
 from triggering.sources.choice import trigger_source
 
 #: A spread of the trigger times within a pulse of more than this share of the period is odd, or an alarm.

@@ -19,6 +19,7 @@ from capture.aravis.features import Features
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
 from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
 from capture.aravis.trigger import SOFTWARE_TRIGGER
+from capture.aravis.wire import Frames, Wire, set_pace
 from capture.command_times import CommandTimes
 from capture.seam import Arrival
 from rig.action import ActionKeys
@@ -45,6 +46,7 @@ _QUEUE_S = 0.5
 _QUEUE_BYTES = 24 << 20
 _QUEUE_LEAST = 8
 _BY_CABLE: Final = ExternalTrigger()
+_ALONE: Final = Wire()
 _TEMPERATURES: Final = ("DeviceTemperature", "TemperatureAbs")  # the second: Basler, before the convention
 
 
@@ -58,6 +60,7 @@ class AravisCamera:
         period_ns: time between two pulses.
         trigger: of the rig file.
         origin: time of a pulse, the same for all programs of the rig; it makes the keys of action commands.
+        wire: the network port at which its packets come in.
 
     Raises:
         CameraNotFoundError: nobody answers at the address.
@@ -72,6 +75,7 @@ class AravisCamera:
         period_ns: int,
         trigger: Trigger = _BY_CABLE,
         origin: HostNs = HostNs(0),
+        wire: Wire = _ALONE,
     ) -> None:
         self._name, self._address, self._ring = settings.name, settings.address, ring
         self._software = trigger if isinstance(trigger, SoftwareTrigger) else None
@@ -100,6 +104,7 @@ class AravisCamera:
             self._device.connect("control-lost", self._on_control_lost)
             self._features = Features(self._device)
             self._configure(settings, network)
+            self._frame_ns = self._set_pace(settings, network, period_ns, wire)
             self._open_clock(settings)
             self._stream = self._open_stream(network)
         except GLib.Error as error:
@@ -119,11 +124,12 @@ class AravisCamera:
 
     @property
     def description(self) -> str:
-        """Vendor, model, serial number and packet size."""
+        """Vendor, model, serial number, packet size, and how long a frame takes if that is known."""
         camera = self._camera
+        time = f", {self._frame_ns / 1e6:.1f} ms to send a frame" if self._frame_ns else ""
         return (
             f"{camera.get_vendor_name()} {camera.get_model_name()} serial {camera.get_device_serial_number()} "
-            f"at {self._address}, {camera.gv_get_packet_size()}-byte packets"
+            f"at {self._address}, {camera.gv_get_packet_size()}-byte packets{time}"
         )
 
     @property
@@ -243,6 +249,13 @@ class AravisCamera:
                 f"camera {self._name} sends {payload} bytes per frame, the rig file's region makes "
                 f"{self._ring.frame_bytes}: correct region and pixel_format of {self._name}"
             )
+
+    def _set_pace(self, settings: CameraSettings, network: NetworkSettings, period_ns: int, wire: Wire) -> float:
+        """Leave time between packets; how long a frame takes, ns."""
+        frames = Frames(settings.frame_bytes, self._camera.gv_get_packet_size(), period_ns)
+        pace = set_pace(self._features, settings.name, network.packet_delay, frames, wire)
+        self._notices += [f"camera {settings.name}: {notice}" for notice in pace.notices]
+        return pace.frame_ns
 
     def _open_clock(self, settings: CameraSettings) -> None:
         """Find a way to read the camera's clock; one that is told to expose can do without."""

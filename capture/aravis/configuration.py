@@ -9,7 +9,6 @@ from typing import Final
 
 from capture.aravis.features import Features
 from capture.aravis.trigger import listed, set_trigger, sets_exposure_time
-from capture.aravis.wire import open_wide
 from rig.action import ActionKeys
 from rig.errors import CameraError
 from rig.settings.camera import CameraSettings
@@ -62,7 +61,6 @@ def configure(
         for name, cost in _SWITCHED_OFF.items()
         if features.has(name) and not features.switch(name, on=False)
     ]
-    notices += open_wide(features)
     _set_image(features, settings)
     notices += set_trigger(features, settings, software=software, action=action)
     notices += _set_exposure(features, settings.exposure_us)

@@ -1,1 +1,1 @@
-"""What this computer has: its disk, how well it knows UTC; and the signals that end a program."""
+"""What this computer has: disk, network ports, how well it knows UTC; and the signals that end a program."""

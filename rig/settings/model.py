@@ -66,6 +66,10 @@ class RecorderSettings(StrictModel):
     )
 
 
+#: "auto", "keep", or microseconds.
+PacketDelay = Literal["auto", "keep"] | Annotated[float, Field(ge=0, le=1_000_000)]
+
+
 class NetworkSettings(StrictModel):
     """How frames are received and triplets published."""
 
@@ -83,6 +87,11 @@ class NetworkSettings(StrictModel):
         ge=576,
         le=65500,
         description="GigE Vision packet size in bytes, IP header included; at most the MTU",
+    )
+    packet_delay: PacketDelay = Field(
+        "auto",
+        description="GigE Vision: time that a camera leaves between its packets. auto: enough for the other cameras at "
+        "the same port of this computer; keep: as another program has left it; a number: microseconds",
     )
     packet_socket: Literal["auto", "off"] = Field(
         "auto",

@@ -18,9 +18,13 @@ _Opener = Callable[[RigSettings, int, CameraRing, HostNs], OpenCamera]
 
 def _aravis(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:
     from capture.aravis.camera import AravisCamera  # noqa: PLC0415
+    from capture.aravis.wire import Wire  # noqa: PLC0415
 
-    trigger = rig.trigger
-    return lambda: AravisCamera(rig.cameras[index], rig.network, ring, trigger.period_ns, trigger, epoch)
+    camera, trigger = rig.cameras[index], rig.trigger
+    addresses = [each.address for each in rig.cameras if each.backend == "aravis"]
+    return lambda: AravisCamera(
+        camera, rig.network, ring, trigger.period_ns, trigger, epoch, Wire.to(camera.address, addresses)
+    )
 
 
 def _iidc(rig: RigSettings, index: int, ring: CameraRing, _epoch: HostNs) -> OpenCamera:

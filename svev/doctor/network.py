@@ -11,12 +11,12 @@ from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, STALL_FRAMES, pre
 from recorder.publishing.keys import exposure, load_keys
 from recorder.publishing.publisher import bind
 from rig.errors import BadInputError
+from rig.host.interfaces import Interface, Way, filters_strictly, sharing_subnet, way_to
 from rig.phrase import phrase
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.gvcp import find_cameras
-from svev.gige.interfaces import Interface, Way, filters_strictly, sharing_subnet, way_to
 
 _CAP_NET_RAW = 13  # linux/capability.h
 _FULL = 0.9  # share of a link's speed above which packets cannot be sent again

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from ipaddress import IPv4Address
 from typing import Final
 
-from svev.gige.interfaces import Interface, own_interfaces
+from rig.host.interfaces import Interface, own_interfaces
 
 PORT: Final = 3956
 _REQUEST = struct.Struct(">BBHHH")  # 0x42, flags, command, length, request id (GigE Vision 2.0, section 15)

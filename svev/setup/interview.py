@@ -9,10 +9,10 @@ from typing import Final
 from analysis.scene.survey import read_survey
 from rig.errors import BadInputError
 from rig.host.disk import free_bytes
+from rig.host.interfaces import interface_to, own_interfaces
 from rig.settings.camera import Backend
 from rig.settings.trigger import GpioTrigger, TriggerBoxTrigger
 from svev.doctor.disk import existing_part
-from svev.gige.interfaces import interface_to, own_interfaces
 from svev.serving.certificates import check_name
 from svev.setup.answers import SOURCES, Answers, CameraAnswer, Language, Source, Today
 from svev.setup.dialog import Dialog

@@ -12,11 +12,11 @@ import pytest
 
 from recorder.checking.verify import verify
 from rig.frame import FrameStatus
+from rig.host.interfaces import Interface
 from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings
 from svev.cli import main
 from svev.doctor.finding import Level
-from svev.gige.interfaces import Interface
 from svev.rehearsal import Rehearsed, headroom_of, judge_pulses, judge_source
 from tests.capture.rigs import write_rig
 from tests.recorder.logs import ALL_OK, OK, write_log

@@ -248,7 +248,17 @@ class Device:
         self._link.connect(*self._destination())
         delay_ticks, tick_hz = self._registers.number("GevSCPD"), self._registers.number("GevTimestampTickFrequency")
         self._link.packet_delay_ns = delay_ticks * NS_PER_S // tick_hz
+        self._link.limit_bytes_s = self._rate_limit()
         self._sensor.acquire(self._store)
+
+    def _rate_limit(self) -> int:
+        """Bytes per second at which other makers' cameras send at most; 0: no limit."""
+        registers = self._registers
+        if "StreamBytesPerSecond" in registers:
+            return registers.number("StreamBytesPerSecond")
+        if "DeviceLinkThroughputLimit" in registers and not registers.number("DeviceLinkThroughputLimitMode"):
+            return registers.number("DeviceLinkThroughputLimit")
+        return 0
 
     def _stop_acquisition(self) -> None:
         """Stop exposing; the transmitter still sends the exposed frames."""

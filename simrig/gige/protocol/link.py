@@ -3,7 +3,7 @@
 import errno
 import socket
 
-from rig.clocks import HostNs, host_now
+from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import BadInputError
 from simrig.gige.protocol.gvsp import IP_UDP_BYTES, WIRE_BYTES, PacketTable
 from simrig.world.statistics import Counters
@@ -30,6 +30,10 @@ class Link:
         mbit_s: rate of the cable; 0: as fast as the machine can.
         counters: the link counts packets and bytes here.
 
+    Attributes:
+        packet_delay_ns: pause after each packet.
+        limit_bytes_s: bytes of packets per second at most; 0: no limit.
+
     Raises:
         BadInputError: the address is none of this machine's.
     """
@@ -40,6 +44,7 @@ class Link:
         self._free_at = 0
         self._peer: tuple[str, int] | None = None
         self.packet_delay_ns = 0
+        self.limit_bytes_s = 0
         self._counters = counters
         self._address = address
         self._socket = bound(address)
@@ -80,7 +85,8 @@ class Link:
         if self._slow is not None and now < self._slow[1]:
             rate = min(rate or self._slow[0], self._slow[0])
         wire_ns = (packet_size + WIRE_BYTES) * 8000 / rate if rate else 0.0
-        return wire_ns + self.packet_delay_ns
+        limited_ns = packet_size * NS_PER_S / self.limit_bytes_s if self.limit_bytes_s else 0.0
+        return max(wire_ns + self.packet_delay_ns, limited_ns)
 
     def begin_frame(self, ready: HostNs) -> None:
         """The next packets belong to a frame that was ready at `ready`; the cable was idle until then."""

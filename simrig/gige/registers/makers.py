@@ -125,7 +125,8 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             Extra("TriggerDelay", 29.0, real=True), Extra("ReverseX", 1, boolean=True),
             Extra("BinningHorizontal", 2, maximum=4), Extra("BinningVertical", 2, maximum=4),
             Extra("TimestampLatch", command=True), Extra("TimestampLatchValue"),
-            Extra("DeviceLinkThroughputLimitMode", 1, ("Off", "On")),
+            Extra("DeviceLinkThroughputLimitMode", 0, ("On", "Off")),
+            Extra("DeviceLinkThroughputLimit", 3_000_000, maximum=125_000_000),
             Extra("ActionSelector", 0, ("Action0",), read_only=True),
         ),
         latch_register=False,
@@ -150,7 +151,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             "PtpEnable": "PtpMode",
         },
         without=_COUNTERS
-        | {"AcquisitionFrameRateEnable", "GevIEEE1588", "GevIEEE1588Status", "OffsetX", "OffsetY"},
+        | {"AcquisitionFrameRateEnable", "GevIEEE1588", "GevIEEE1588Status", "OffsetX", "OffsetY", "GevSCPD"},
         entries={
             "TriggerSelector": ("FrameStart", "AcquisitionStart", "AcquisitionEnd"),
             "TriggerSource": ("Line1", "Line2", "Software", "Action0", "Freerun"),
@@ -160,6 +161,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             Extra("ExposureAuto", _CONTINUOUS, ("Off", "Once", "Continuous", "Other")),
             Extra("GainAuto", _CONTINUOUS, _AUTO), Extra("GainSelector", 0, ("All",)),
             Extra("TriggerDelayAbs", 0.0, real=True), Extra("TriggerOverlap", 0, ("Off", "PreviousFrame")),
+            Extra("StreamBytesPerSecond", 3_000_000, maximum=124_000_000),
         ),
     ),
     Maker.JAI: Dialect(
@@ -188,7 +190,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
     ),
     Maker.PROSILICA: Dialect(
         names={"ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs"},
-        without=_SHORT_IDS | _COUNTERS | {"AcquisitionFrameRateEnable", "Gain", "PtpEnable", "GevIEEE1588"},
+        without=_SHORT_IDS | _COUNTERS | {"AcquisitionFrameRateEnable", "Gain", "PtpEnable", "GevIEEE1588", "GevSCPD"},
         entries={"TriggerSource": ("Line1", "Line2", "Software")},
         categories={"AnalogControl": "Gain"},
         extra=(
@@ -221,7 +223,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
         ),
     ),
     Maker.BASLER_ACE_2: Dialect(
-        without=_COUNTERS | {"PtpStatus", "GevIEEE1588", "GevIEEE1588Status", "PtpEnable"},
+        without=_COUNTERS | {"PtpStatus", "GevIEEE1588", "GevIEEE1588Status", "PtpEnable", "GevSCPD"},
         entries={
             "TriggerSelector": ("FrameBurstStart", "FrameStart"),
             "TriggerSource": ("Line1", "Line2", "Software", "Action1"),

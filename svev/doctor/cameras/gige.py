@@ -5,13 +5,13 @@ import socket
 from collections.abc import Iterator
 
 from rig.errors import BadInputError
+from rig.host.interfaces import sharing_subnet, way_to
 from rig.phrase import phrase
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from service.processes.replayed_log import check_replay
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.gvcp import FoundCamera, ask_camera, find_cameras
-from svev.gige.interfaces import sharing_subnet, way_to
 from svev.gige.path_probe import SMALL, largest_packet
 
 _ANSWER_S = 1.5

@@ -5,13 +5,15 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from capture.aravis.camera import AravisCamera
+from capture.aravis.wire import Wire
 from rig.clocks import NS_PER_S, host_now
 from rig.errors import CameraError
-from rig.settings.model import RigSettings
+from rig.settings.model import PacketDelay, RigSettings
 from rig.transport.ring import CameraRing
 from simrig.gige.camera import Camera
 from simrig.gige.configuration import CameraConfig
@@ -25,8 +27,8 @@ from tests.support.loopback import Loopback
 HARMLESS = {
     "TriggerMode": 1, "AcquisitionFrameRateEnable": 0, "ExposureAuto": 0, "GainAuto": 0, "GammaEnable": 0,
     "ReverseX": 0, "BinningHorizontal": 1, "BinningVertical": 1, "AcquisitionBurstFrameCount": 1, "TestPattern": 0,
-    "TestImageSelector": 0, "TriggerOverlap": 1, "DeviceLinkThroughputLimitMode": 0, "GainRaw": 0,
-    "DeviceLinkThroughputLimit": 125_000_000, "LineSelector": 0, "LineInverter": 0, "ShutterMode": 1,
+    "TestImageSelector": 0, "TriggerOverlap": 1, "GainRaw": 0, "StreamBytesPerSecond": 124_000_000,
+    "LineSelector": 0, "LineInverter": 0, "ShutterMode": 1,
 }  # fmt: skip
 
 
@@ -35,6 +37,7 @@ class Made:
 
     def __init__(self, maker: Maker, rig: RigSettings, camera: Camera, ring: CameraRing) -> None:
         self.maker, self.rig, self.ring = maker, rig, ring
+        self.camera = camera
         self.registers: RegisterMap = camera._device._registers
 
     @property
@@ -45,10 +48,16 @@ class Made:
         return self.registers.real("ExposureTime")
 
     @contextmanager
-    def opened(self, **settings: object) -> Iterator[AravisCamera]:
+    def opened(
+        self, *, packet_delay: PacketDelay = "auto", wire: Wire | None = None, **settings: Any
+    ) -> Iterator[AravisCamera]:
         """The camera, opened by the back end."""
         wanted = self.rig.cameras[0].model_copy(update={"trigger_input": self._input(), **settings})
-        camera = AravisCamera(wanted, self.rig.network, self.ring, self.rig.trigger.period_ns)
+        network, period_ns = (
+            self.rig.network.model_copy(update={"packet_delay": packet_delay}),
+            self.rig.trigger.period_ns,
+        )
+        camera = AravisCamera(wanted, network, self.ring, period_ns, wire=wire or Wire())
         try:
             yield camera
         finally:
@@ -61,12 +70,12 @@ class Made:
 
 @pytest.fixture
 def made(request: pytest.FixtureRequest, tmp_path: Path, loopback: Loopback) -> Iterator[Made]:
-    with _made(request.param, tmp_path, loopback) as made:
+    with make(request.param, tmp_path, loopback) as made:
         yield made
 
 
 @contextmanager
-def _made(maker: Maker, tmp_path: Path, loopback: Loopback) -> Iterator[Made]:
+def make(maker: Maker, tmp_path: Path, loopback: Loopback) -> Iterator[Made]:
     rig = make_rig(tmp_path, "aravis", loopback, names=["K2"])
     config = CameraConfig(
         name="K2", address=rig.cameras[0].address, scenario=SCENARIO, rate_hz=rig.trigger.rate_hz, epoch=host_now(),
@@ -92,7 +101,7 @@ def test_a_camera_of_any_maker_takes_one_frame_per_pulse_as_the_rig_file_says(ma
         selectors = DIALECTS[made.maker].entries.get("TriggerSelector", ("FrameStart",))
         assert selectors[registers.number("TriggerSelector")] in {"FrameStart", "FrameBurstStart", "ExposureStart"}
         camera.start()
-        pulses, times = _frames(camera, made, 6)
+        pulses, times = frames_of(camera, made, 6)
         assert pulses == list(range(pulses[0], pulses[0] + 6))
         assert camera.counters()["temperature_mdeg"] > 0
         latch = camera.latch()
@@ -101,7 +110,7 @@ def test_a_camera_of_any_maker_takes_one_frame_per_pulse_as_the_rig_file_says(ma
         assert periods == pytest.approx([1.0] * 5, abs=0.02)
 
 
-def _frames(camera: AravisCamera, made: Made, count: int) -> tuple[list[int], list[int]]:
+def frames_of(camera: AravisCamera, made: Made, count: int) -> tuple[list[int], list[int]]:
     region, deadline = made.rig.cameras[0].region, host_now() + 20 * NS_PER_S
     pulses, times = list[int](), list[int]()
     while len(pulses) < count:
@@ -140,7 +149,7 @@ def _frames(camera: AravisCamera, made: Made, count: int) -> tuple[list[int], li
     indirect=["made"],
 )
 def test_what_would_make_a_recording_wrong_is_refused_with_what_the_camera_has(
-    made: Made, settings: dict[str, str], told: str
+    made: Made, settings: dict[str, Any], told: str
 ) -> None:
     with pytest.raises(CameraError) as refused, made.opened(**settings):
         pass
@@ -157,7 +166,7 @@ def test_what_would_make_a_recording_wrong_is_refused_with_what_the_camera_has(
     indirect=["made"],
 )
 def test_gain_in_steps_alone_is_set_in_steps_or_by_what_a_step_is(
-    made: Made, settings: dict[str, object], steps: int
+    made: Made, settings: dict[str, Any], steps: int
 ) -> None:
     with made.opened(**settings) as camera:
         assert not [notice for notice in camera.notices() if "ain" in notice]
@@ -171,7 +180,7 @@ def test_a_camera_whose_exposure_mode_is_unknown_is_refused_with_what_is_true(
     modes = {**dialect.entries, "TriggerMode": ("Continuous", "PulseWidthControl")}
     monkeypatch.setitem(DIALECTS, Maker.JAI_LINES, replace(dialect, entries=modes))
     told = "it has no TriggerMode, and its ExposureMode has Continuous, PulseWidthControl, none of which is known here"
-    with _made(Maker.JAI_LINES, tmp_path, loopback) as made, pytest.raises(CameraError, match=told), made.opened():
+    with make(Maker.JAI_LINES, tmp_path, loopback) as made, pytest.raises(CameraError, match=told), made.opened():
         pass
 
 
@@ -190,9 +199,7 @@ def test_a_camera_whose_exposure_mode_is_unknown_is_refused_with_what_is_true(
     ],
     indirect=["made"],
 )
-def test_what_cannot_be_set_is_said_with_what_it_costs(
-    made: Made, settings: dict[str, object], told: list[str]
-) -> None:
+def test_what_cannot_be_set_is_said_with_what_it_costs(made: Made, settings: dict[str, Any], told: list[str]) -> None:
     with made.opened(**settings) as camera:
         notices = camera.notices()
     assert len(notices) == len(told)

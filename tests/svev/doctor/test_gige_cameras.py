@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from rig.host.interfaces import Interface
 from rig.settings.camera import Region
 from rig.settings.file import CONFIG, load_rig
 from simrig.programs.simulated_hill import SimulatedHill
 from svev.doctor.cameras import gige
 from svev.doctor.finding import Level
 from svev.gige.gvcp import FoundCamera, GigeCamera, ask_camera
-from svev.gige.interfaces import Interface
 from tests.capture.rigs import make_rig
 from tests.recorder.logs import write_log
 from tests.support.loopback import Loopback

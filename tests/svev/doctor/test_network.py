@@ -9,11 +9,11 @@ import pytest
 import zmq
 
 from recorder.publishing.keys import make_keys
+from rig.host.interfaces import Interface, interface_to
 from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings
 from svev.doctor import network
 from svev.doctor.finding import Level
-from svev.gige.interfaces import Interface, interface_to
 from tests.support.loopback import Loopback
 from tests.support.rigs import SIM, rig_with, write_rig
 

@@ -14,8 +14,8 @@ import gi
 
 from capture.aravis.action import lock_clock
 from capture.aravis.clock import CameraClock
-from capture.aravis.configuration import configure, region_limits
-from capture.aravis.features import Features
+from capture.aravis.configuration import configure, gain_steps, region_limits
+from capture.aravis.features import Features, text_at
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
 from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
 from capture.aravis.trigger import SOFTWARE_TRIGGER
@@ -38,6 +38,7 @@ from gi.repository import Aravis, GLib  # noqa: E402  (the version must be requi
 for _interface in ("USB3Vision", "Fake"):
     Aravis.disable_interface(_interface)
 
+_NAMES: Final = ((0x48, 32), (0x68, 32), (0xD8, 16))  # vendor, model, serial number: GigE Vision 2.0, section 28
 _STREAM_SOURCE_PORT = 0x0D1C  # GigE Vision 2.0, section 28
 _IDS_16_BIT = 65535
 _RETENTION_US = 50_000  # enough to ask for lost packets several times and to receive them
@@ -61,6 +62,7 @@ class AravisCamera:
         trigger: of the rig file.
         origin: time of a pulse, the same for all programs of the rig; it makes the keys of action commands.
         wire: the network port at which its packets come in.
+        set_back: whether `close` sets it as it was before.
 
     Raises:
         CameraNotFoundError: nobody answers at the address.
@@ -76,13 +78,15 @@ class AravisCamera:
         trigger: Trigger = _BY_CABLE,
         origin: HostNs = HostNs(0),
         wire: Wire = _ALONE,
+        *,
+        set_back: bool = False,
     ) -> None:
         self._name, self._address, self._ring = settings.name, settings.address, ring
         self._software = trigger if isinstance(trigger, SoftwareTrigger) else None
         self._action = trigger if isinstance(trigger, ActionTrigger) else None
         self._keys = None if self._action is None else ActionKeys.of(origin)
         self._commands: CommandTimes | None = None
-        self._lost = False
+        self._lost, self._set_back = False, set_back
         self._plain_socket = prefers_plain_socket(network, settings.frame_bytes, period_ns)
         self._buffers: dict[int, int] = {}
         self._of_slot: list[Aravis.Buffer] = []
@@ -103,7 +107,7 @@ class AravisCamera:
             filter_control(sockets, self._camera_host())
             self._device.connect("control-lost", self._on_control_lost)
             self._features = Features(self._device)
-            self._configure(settings, network)
+            self._configure(settings, network, NS_PER_S / period_ns)
             self._frame_ns = self._set_pace(settings, network, period_ns, wire)
             self._open_clock(settings)
             self._stream = self._open_stream(network)
@@ -125,17 +129,20 @@ class AravisCamera:
     @property
     def description(self) -> str:
         """Vendor, model, serial number, packet size, and how long a frame takes if that is known."""
-        camera = self._camera
+        vendor, model, serial = (text_at(self._device, *place) for place in _NAMES)
         time = f", {self._frame_ns / 1e6:.1f} ms to send a frame" if self._frame_ns else ""
-        return (
-            f"{camera.get_vendor_name()} {camera.get_model_name()} serial {camera.get_device_serial_number()} "
-            f"at {self._address}, {camera.gv_get_packet_size()}-byte packets{time}"
-        )
+        size = self._camera.gv_get_packet_size()
+        return f"{vendor} {model} serial {serial} at {self._address}, {size}-byte packets{time}"
 
     @property
     def limits(self) -> RegionLimits | None:
         """See `capture.seam.Camera.limits`."""
         return region_limits(self._features)
+
+    @property
+    def gain_steps(self) -> tuple[int, int] | None:
+        """Least and largest gain of a camera that has it in steps alone."""
+        return gain_steps(self._features)
 
     def start(self) -> None:
         """See `capture.seam.Camera.start`."""
@@ -216,6 +223,8 @@ class AravisCamera:
         """Stop, leave control (or the next opening would wait for the heartbeat), and drop all Aravis objects."""
         try:
             self._camera.stop_acquisition()
+            if self._set_back:
+                self._features.set_back()
             self._device.leave_control()
         except (AttributeError, GLib.Error):
             # The camera was never fully opened, or it is dead: then its heartbeat runs out by itself.
@@ -233,12 +242,15 @@ class AravisCamera:
     def _on_control_lost(self, _device: object) -> None:
         self._lost = True
 
-    def _configure(self, settings: CameraSettings, network: NetworkSettings) -> None:
+    def _configure(self, settings: CameraSettings, network: NetworkSettings, rate_hz: float) -> None:
         """Set everything that must be set before the stream is made."""
         # No local names for Aravis objects: the traceback of an error would keep the camera's sockets open.
-        self._notices += configure(self._features, settings, software=self._software is not None, action=self._keys)
+        self._notices += configure(
+            self._features, settings, rate_hz, software=self._software is not None, action=self._keys
+        )
         if self._action is not None and self._action.scheduled:
             lock_clock(self._features, settings.name)
+        self._features.remember("GevSCPSPacketSize")
         self._camera.gv_set_packet_size(network.packet_size)
         if self._plain_socket:
             self._camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)

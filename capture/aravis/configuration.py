@@ -33,18 +33,25 @@ _SWITCHED_OFF: Final = {
 _AS_THE_SENSOR_SEES: Final = ("ReverseX", "ReverseY")
 _ONE: Final = ("1", "x1", "Off", "None")  # as an enumeration says that nothing is reduced
 _NOT_REDUCED: Final = ("BinningHorizontal", "BinningVertical", "DecimationHorizontal", "DecimationVertical")
+#: Frames per second that exposure, region and link allow, by the names of Basler, Hikrobot, FLIR and Allied Vision.
+_FASTEST: Final = (
+    "ResultingFrameRateAbs", "BslResultingAcquisitionFrameRate", "ResultingFrameRate", "AcquisitionResultingFrameRate",
+    "AcquisitionFrameRateLimit",
+)  # fmt: skip
+_RATE_SHARE: Final = 0.99
 #: Exposure and gain may differ so much from those wanted before that is said: steps of the sensor are smaller.
 _EXPOSURE_SHARE, _EXPOSURE_US, _GAIN_DB = 0.02, 20.0, 0.5
 
 
 def configure(
-    features: Features, settings: CameraSettings, *, software: bool, action: ActionKeys | None = None
+    features: Features, settings: CameraSettings, rate_hz: float, *, software: bool, action: ActionKeys | None = None
 ) -> list[str]:
     """Set everything but the packets, in the order that cameras accept.
 
     Args:
         features: of the camera.
         settings: of the camera in the rig file.
+        rate_hz: how often pulses come.
         software: it exposes at commands, not at pulses of its input.
         action: keys of the action commands at which it exposes; None: at none.
 
@@ -65,6 +72,7 @@ def configure(
     notices += set_trigger(features, settings, software=software, action=action)
     notices += _set_exposure(features, settings.exposure_us)
     notices += _set_gain(features, settings)
+    notices += _too_slow(features, rate_hz)
     return [f"camera {settings.name}: {notice}" for notice in notices]
 
 
@@ -134,6 +142,25 @@ def _set_exposure(features: Features, wanted_us: float) -> list[str]:
     if abs(got - wanted_us) > max(_EXPOSURE_SHARE * wanted_us, _EXPOSURE_US):
         return [f"it exposes {got:g} us, not {wanted_us:g}"]
     return []
+
+
+def _too_slow(features: Features, rate_hz: float) -> list[str]:
+    """Whether the camera says that with these settings it takes fewer frames than pulses come."""
+    name = features.first_number(*_FASTEST)
+    most = None if name is None else features.number(name)
+    if not most or most >= _RATE_SHARE * rate_hz:
+        return []
+    slow = (
+        f"it takes {most:.1f} frames per second at most ({name}), and {rate_hz:g} pulses come: shorten exposure_us, or "
+        "choose a smaller region"
+    )
+    return [slow]
+
+
+def gain_steps(features: Features) -> tuple[int, int] | None:
+    """Least and largest gain of a camera that has it in steps alone; None for others."""
+    bounds = None if features.first_number("Gain", "GainAbs") else features.bounds("GainRaw")
+    return None if bounds is None else bounds[:2]
 
 
 def _set_gain(features: Features, settings: CameraSettings) -> list[str]:

@@ -3,6 +3,8 @@
 Nothing here raises because a feature is missing or refuses a value: the caller learns it and decides what that costs.
 """
 
+import ctypes
+from contextlib import suppress
 from typing import Final
 
 import gi
@@ -27,6 +29,40 @@ class Features:
 
     def __init__(self, device: "Aravis.Device") -> None:
         self._device = device
+        self._before: list[tuple[str, float | str | bool]] = []
+
+    def remember(self, name: str) -> None:
+        """Note the present value of a feature that is about to be written, if it can be read."""
+        value = self._value(name)
+        if value is not None:
+            self._before.append((name, value))
+
+    def set_back(self) -> None:
+        """Write what was there before, the latest first, so that selectors select what they did then."""
+        while self._before:
+            name, value = self._before.pop()
+            with suppress(GLib.Error):  # it was not to be written now, or it is no longer there
+                self._write(name, value)
+
+    def _value(self, name: str) -> float | str | bool | None:
+        feature = self._device.get_feature(name)
+        try:
+            if isinstance(feature, Aravis.GcBoolean):
+                return bool(self._device.get_boolean_feature_value(name))
+        except GLib.Error:
+            return None
+        return self.chosen(name) if isinstance(feature, Aravis.GcEnumeration) else self.number(name)
+
+    def _write(self, name: str, value: float | str | bool) -> None:
+        """Write a feature by its kind."""
+        if isinstance(value, bool):
+            self._device.set_boolean_feature_value(name, value)
+        elif isinstance(value, str):
+            self._device.set_string_feature_value(name, value)
+        elif isinstance(self._device.get_feature(name), Aravis.GcFloat):
+            self._device.set_float_feature_value(name, value)
+        else:
+            self._device.set_integer_feature_value(name, int(value))
 
     def close(self) -> None:
         """Let the camera go; nothing can be asked any more."""
@@ -73,8 +109,9 @@ class Features:
         """Set an enumeration that has the value not already: many can only be read, or have one value."""
         if self.chosen(name) == entry:
             return True
+        self.remember(name)
         try:
-            self._device.set_string_feature_value(name, entry)
+            self._write(name, entry)
         except GLib.Error:
             return False
         return self.chosen(name) in {entry, None}  # some cannot be read back
@@ -103,7 +140,8 @@ class Features:
             return self.set_number(name, on) == on
         try:
             if bool(self._device.get_boolean_feature_value(name)) != on:
-                self._device.set_boolean_feature_value(name, on)
+                self.remember(name)
+                self._write(name, on)
             return bool(self._device.get_boolean_feature_value(name)) == on
         except GLib.Error:
             return False
@@ -119,14 +157,15 @@ class Features:
         try:
             if not self._is_number(name):
                 return None
+            self.remember(name)
             if isinstance(self._device.get_feature(name), Aravis.GcFloat):
                 low, high = self._device.get_float_feature_bounds(name)
-                self._device.set_float_feature_value(name, min(max(value, low), high))
+                self._write(name, min(max(value, low), high))
             else:
                 low, high = self._device.get_integer_feature_bounds(name)
                 step = max(1, self._device.get_integer_feature_increment(name))
                 steps = min(round((min(max(value, low), high) - low) / step), (high - low) // step)
-                self._device.set_integer_feature_value(name, low + steps * step)
+                self._write(name, low + steps * step)
         except GLib.Error:
             return None
         return self.number(name)
@@ -150,7 +189,8 @@ class Features:
         try:
             if not self.has(name):
                 return False
-            self._device.set_integer_feature_value(name, value)
+            self.remember(name)
+            self._write(name, value)
         except GLib.Error:
             return False
         return True
@@ -183,3 +223,14 @@ class Features:
         except GLib.Error:
             return False
         return True
+
+
+def text_at(device: "Aravis.Device", address: int, length: int) -> str:
+    """Text in a camera's memory, whatever bytes it holds: Aravis hands out UTF-8 alone.
+
+    Raises:
+        GLib.Error: the camera does not answer, or has nothing there.
+    """
+    memory = ctypes.create_string_buffer(length)
+    device.read_memory(address, length, ctypes.addressof(memory))
+    return memory.raw.split(b"\0")[0].decode(errors="replace")

@@ -54,7 +54,7 @@ def probes(rig: RigSettings, directory: Path, interrupted: bool | None = None) -
         Probe("interfaces", Topic.NETWORK, lambda: network.look_at_interfaces(rig)),
         Probe("publication", Topic.NETWORK, lambda: network.look_at_publication(rig)),
         Probe("webhook", Topic.NETWORK, lambda: webhook.look_at_webhook(rig), limit_s=webhook.LOOK_S + 2),
-        Probe("cameras", Topic.CAMERAS, lambda: gige.look_at_cameras(rig), limit_s=5.0 * len(rig.cameras)),
+        Probe("cameras", Topic.CAMERAS, lambda: gige.look_at_cameras(rig), limit_s=gige.look_limit_s(rig)),
         Probe("exposure", Topic.CAMERAS, lambda: exposure.look_at_exposures(rig)),
         Probe("FireWire", Topic.CAMERAS, lambda: firewire.look_at_firewire(rig), limit_s=firewire.LOOK_S + 2),
         Probe("trigger box", Topic.CAMERAS, lambda: trigger_box.look_at_trigger_box(rig)),

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import gi
 
+from capture.aravis.features import text_at
 from rig.errors import CameraError, CameraNotFoundError
 
 gi.require_version("Aravis", "0.8")
@@ -70,7 +71,7 @@ def _below(device: Any, description: Any, category: Any) -> Iterator[Feature]:
 
 def _told(device: Any, node: Any, name: str) -> tuple[str, str, str]:
     """Value, unit, and what is allowed."""
-    value = str(node.get_value_as_string())
+    value = _text(device, node)
     if isinstance(node, Aravis.GcEnumeration):
         return value, "", ", ".join(device.dup_available_enumeration_feature_values_as_strings(name))
     if isinstance(node, Aravis.GcFloat):
@@ -78,6 +79,16 @@ def _told(device: Any, node: Any, name: str) -> tuple[str, str, str]:
     if isinstance(node, Aravis.GcInteger) and not isinstance(node, Aravis.GcBoolean):
         return value, node.get_unit() or "", _range(*device.get_integer_feature_bounds(name))
     return value, "", ""
+
+
+def _text(device: Any, node: Any) -> str:
+    """A value as text. Names that people give may hold any bytes, of which Aravis hands out UTF-8 alone."""
+    try:
+        return str(node.get_value_as_string())
+    except UnicodeDecodeError:
+        if isinstance(node, Aravis.GcRegister):
+            return text_at(device, node.get_address(), node.get_length())
+        return "(bytes that are no text in UTF-8)"
 
 
 def _range(low: float, high: float) -> str:

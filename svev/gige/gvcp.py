@@ -7,13 +7,13 @@ it. It hears broadcasts all the same, and if it is allowed to, answers with a br
 import socket
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from ipaddress import IPv4Address
 from typing import Final
 
-from rig.host.interfaces import Interface, own_interfaces
+from rig.host.interfaces import Interface, interface_to, own_interfaces
 
 PORT: Final = 3956
 _REQUEST = struct.Struct(">BBHHH")  # 0x42, flags, command, length, request id (GigE Vision 2.0, section 15)
@@ -57,11 +57,13 @@ class FoundCamera:
         camera: what it says of itself.
         interface: the network port behind which it is.
         reachable: whether its address is in the subnet of this port.
+        asked: it answers at its address alone, not to a broadcast.
     """
 
     camera: GigeCamera
     interface: Interface
     reachable: bool
+    asked: bool = False
 
 
 def ask_camera(address: str, timeout_s: float) -> tuple[GigeCamera, bool] | None:
@@ -98,6 +100,22 @@ def find_cameras(only: str | None = None) -> list[FoundCamera]:
             if reachable or camera.mac not in found:  # several ports may lead to the same switch
                 found[camera.mac] = FoundCamera(camera, interface, reachable)
     return sorted(found.values(), key=lambda each: IPv4Address(each.camera.address))
+
+
+def ask_cameras(addresses: Iterable[str], timeout_s: float) -> list[FoundCamera]:
+    """Cameras that answer at these addresses, in networks that carry no broadcast, where `find_cameras` is blind.
+
+    Args:
+        addresses: one by one.
+        timeout_s: so long each is waited for, s.
+    """
+    found = []
+    for address in addresses:
+        with suppress(OSError, ValueError):  # no way leads there, or there is no camera
+            answer, port = ask_camera(address, timeout_s), interface_to(address)
+            if answer is not None and port is not None:
+                found.append(FoundCamera(answer[0], port, reachable=True, asked=True))
+    return found
 
 
 def force_address(mac: str, interface: Interface, address: IPv4Address) -> None:

@@ -3,15 +3,19 @@
 import json
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from rig.settings.file import CONFIG
+from rig.settings.file import CONFIG, load_rig
+from simrig.gige.registers.makers import Maker
 from simrig.programs.simulated_hill import SimulatedHill
+from tests.capture.aravis.test_makers import make
 from tests.simrig.gige.raw_client import CCP, GvcpClient
 from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
+from tests.support.rigs import write_rig
 
 _CURRENT_CONFIGURATION, _PERSISTENT_ADDRESS, _PERSISTENT_BIT = 0x0014, 0x064C, 1
 _CONTROL = 2
@@ -67,3 +71,26 @@ def test_a_camera_in_use_and_addresses_that_do_not_fit_are_refused(addresses: tu
     for wanted, words in refused.items():
         done = _cameras("set-ip", left, wanted, "--interface", "lo")
         assert (done.returncode, words in done.stderr) == (2, True), done.stderr
+
+
+def test_cameras_that_answer_no_broadcast_are_found_by_the_rig_file(tmp_path: Path, loopback: Loopback) -> None:
+    rig = write_rig(tmp_path, loopback, simulated=False)
+    names = {camera.name: camera.address for camera in load_rig(rig).cameras[:2]}
+    with SimulatedHill(CONFIG / "scenarios" / "training.toml", names, 30.0, test_pattern=True):
+        done = _cameras("list", "--interface", "none0", "--rig", str(rig))
+        found = _answer("list", "--interface", "none0", "--rig", str(rig))["cameras"]
+    lines = done.stdout.splitlines()
+    assert len(lines) == 2
+    assert all(line.endswith("found by the rig file's address: it does not answer broadcasts here") for line in lines)
+    assert [each["address"] for each in found] == list(names.values())
+    assert all(each["asked"] and each["reachable"] for each in found)
+
+
+def test_names_may_hold_any_bytes(tmp_path: Path, loopback: Loopback) -> None:
+    with make(Maker.STANDARD, tmp_path, loopback) as made:
+        made.registers.set("DeviceUserID", "Sk\udce5d")  # Latin-1
+        made.registers.set("DeviceModelName", "\udcff\udcfe1")
+        there = {each["name"]: each for each in _answer("show", made.rig.cameras[0].address)["features"]}
+        assert there["DeviceUserID"]["value"] == "Sk\ufffdd"
+        with made.opened() as camera:
+            assert camera.description.startswith("Svev \ufffd\ufffd1 serial SIM-")

@@ -111,6 +111,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             Extra("ExposureTimeRaw", 2000), Extra("ActionSelector", 0, maximum=1),
             Extra("TestImageSelector", 1, ("Off", "Testimage1")),
             Extra("LineSelector", 0, ("Line1", "Out1")), Extra("LineDebouncerTimeAbs", 10.0, real=True),
+            Extra("ResultingFrameRateAbs", 61.5, real=True, read_only=True),
         ),
     ),
     Maker.FLIR: Dialect(
@@ -274,7 +275,7 @@ def _register(extra: Extra, address: int) -> Register:
             _STEP,
             Kind.FLOAT,
             float(extra.default),
-            writable=True,
+            writable=not extra.read_only,
             minimum=0,
             maximum=extra.maximum,
         )

@@ -57,17 +57,17 @@ class Register:
             case Kind.FLOAT:
                 return float(struct.unpack(">d", data)[0])
             case Kind.TEXT:
-                return data.split(b"\0", 1)[0].decode("utf-8", "replace")
+                return data.split(b"\0", 1)[0].decode("utf-8", "surrogateescape")
 
     def encode(self, value: Value) -> bytes:
-        """The register's bytes for a value; text that is too long is cut."""
+        """The register's bytes for a value; text that is too long is cut, and holds any bytes (surrogate escapes)."""
         match self.kind:
             case Kind.UINT | Kind.INT:
                 return int(value).to_bytes(self.length, "big", signed=self.kind is Kind.INT)
             case Kind.FLOAT:
                 return struct.pack(">d", value)
             case Kind.TEXT:
-                return str(value).encode()[: self.length - 1].ljust(self.length, b"\0")
+                return str(value).encode("utf-8", "surrogateescape")[: self.length - 1].ljust(self.length, b"\0")
 
     def allows(self, value: Value) -> bool:
         """Whether a controller may write `value`."""

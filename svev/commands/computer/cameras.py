@@ -3,14 +3,16 @@
 from dataclasses import asdict
 from ipaddress import IPv4Address
 from itertools import groupby
+from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
 
 from rig.errors import BadInputError, CameraError
+from rig.settings.file import load_rig
 from svev import console
 from svev.gige.features import features, keep_address
-from svev.gige.gvcp import FoundCamera, ask_camera, find_cameras, force_address
+from svev.gige.gvcp import FoundCamera, ask_camera, ask_cameras, find_cameras, force_address
 
 app = typer.Typer(
     help="Find GigE Vision cameras, show their features, give them addresses.",
@@ -29,12 +31,28 @@ Json = Annotated[bool, typer.Option("--json", help="end with one JSON object")]
 
 
 @app.command("list")
-def list_command(interface: Port = None, as_json: Json = False) -> None:
+def list_command(
+    interface: Port = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RIG.toml",
+            help="ask at the addresses of this rig file too, for networks that carry no broadcast",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """List the cameras behind all network ports, also those whose address fits no port.
 
     Example: svev cameras list
+
+    Example: svev cameras list --rig /etc/svev/rig.toml
     """
+    addresses = [] if rig is None else [each.address for each in load_rig(rig).cameras if each.backend == "aravis"]
     found = find_cameras(interface)
+    there = {each.camera.address for each in found}
+    found += ask_cameras((each for each in addresses if each not in there), _ANSWER_S)
     if as_json:
         console.print_json({"cameras": [_as_json(each) for each in found]})
         return
@@ -43,9 +61,15 @@ def list_command(interface: Port = None, as_json: Json = False) -> None:
         what = (
             f"{camera.address:15} {camera.mac} {camera.vendor} {camera.model}, serial {camera.serial}, at {port.name}"
         )
-        console.say(what if each.reachable else f"{what}, which reaches {port.network} only: svev cameras set-ip")
+        if each.asked:
+            what += ", found by the rig file's address: it does not answer broadcasts here"
+        elif not each.reachable:
+            what += f", which reaches {port.network} only: svev cameras set-ip"
+        console.say(what)
     if not found:
         console.say("no camera answers: check power and cables, and that no firewall blocks UDP port 3956")
+        if rig is None:
+            console.say("where the network carries no broadcast, give the addresses: svev cameras list --rig RIG.toml")
 
 
 @app.command()
@@ -157,4 +181,9 @@ def _look_again(chosen: FoundCamera, wanted: IPv4Address) -> FoundCamera:
 
 def _as_json(found: FoundCamera) -> dict[str, Any]:
     port = found.interface
-    return asdict(found.camera) | {"interface": port.name, "subnet": str(port.network), "reachable": found.reachable}
+    return asdict(found.camera) | {
+        "interface": port.name,
+        "subnet": str(port.network),
+        "reachable": found.reachable,
+        "asked": found.asked,
+    }

@@ -3,16 +3,14 @@
 The child sees the emulated bus of a simulated rig, if it is started with the right environment.
 """
 
-import tempfile
-import time
 from collections.abc import Iterator, Mapping
-from typing import IO, Final
+from typing import Final
 
 from rig.clocks import host_now
 from rig.settings.model import RigSettings
-from rig.transport.process_table import Child, ProcessSpec
 from service.processes.simulation import hill_environment
-from svev.doctor.cameras.firewire_process import Examination, Found
+from svev.doctor.cameras.child import hear
+from svev.doctor.cameras.firewire_process import Examination
 from svev.doctor.finding import Finding, Topic, failure, passed
 
 #: Time limits, s: of the examination without trial, and of the trial of each camera.
@@ -56,39 +54,14 @@ def trial_limit_s(rig: RigSettings) -> float:
 
 def _ask(rig: RigSettings, variables: Mapping[str, str], *, trial: bool) -> Iterator[Finding]:
     limit_s = trial_limit_s(rig) if trial else LOOK_S
-    with tempfile.TemporaryFile() as output:
-        config = Examination(rig=rig, trial=trial)
-        child = Child(
-            ProcessSpec(
-                "FireWire examination", "svev.doctor.cameras.firewire_process", config, environment=variables,
-                reports=Found, output=output,
-            )
-        )  # fmt: skip
-        try:
-            findings = _findings(child, time.monotonic() + limit_s)
-        finally:
-            child.kill()
-        if findings is None:
-            remedy = "plug the FireWire card's cables out and in, and look at `dmesg`"
-            what = "the FireWire bus did not answer within {seconds:g} s"
-            yield failure(Topic.CAMERAS, "check_firewire_hangs", what, remedy, seconds=limit_s)
-            return
-        yield from findings
-        if child.ending() != "exit code 0":
-            what, remedy = "FireWire cannot be examined: {why}", "report it with this line"
-            yield failure(Topic.CAMERAS, "check_firewire_broken", what, remedy, why=_last_line(output))
-
-
-def _findings(child: Child, deadline: float) -> list[Finding] | None:
-    """All findings of the child; None if it has not ended at the deadline."""
-    findings = []
-    while (found := child.control.next(deadline - time.monotonic())) is not None:
-        findings.append(found.finding)
-    ended = child.control.ended and child.wait(max(0.0, deadline - time.monotonic()))
-    return findings if ended else None
-
-
-def _last_line(output: IO[bytes]) -> str:
-    output.seek(0)
-    lines = output.read().decode("utf-8", "replace").strip().splitlines()
-    return lines[-1] if lines else "no reason given"
+    program, config = "svev.doctor.cameras.firewire_process", Examination(rig=rig, trial=trial)
+    heard = hear("FireWire examination", program, config, limit_s, variables)
+    if heard.hangs:
+        remedy = "plug the FireWire card's cables out and in, and look at `dmesg`"
+        what = "the FireWire bus did not answer within {seconds:g} s"
+        yield failure(Topic.CAMERAS, "check_firewire_hangs", what, remedy, seconds=limit_s)
+        return
+    yield from heard.findings
+    if heard.broken:
+        what, remedy = "FireWire cannot be examined: {why}", "report it with this line"
+        yield failure(Topic.CAMERAS, "check_firewire_broken", what, remedy, why=heard.broken)

@@ -3,9 +3,9 @@
 from rig.settings.model import RigSettings
 from rig.transport.child import begin
 from rig.transport.message import Message, Quit
+from svev.doctor.cameras.child import Found
 from svev.doctor.cameras.firewire_cameras import look_at_cameras
 from svev.doctor.cameras.firewire_trial import try_camera
-from svev.doctor.finding import Finding
 
 
 class Examination(Message):
@@ -18,12 +18,6 @@ class Examination(Message):
 
     rig: RigSettings
     trial: bool
-
-
-class Found(Message):
-    """One finding."""
-
-    finding: Finding
 
 
 def main() -> None:

@@ -2,7 +2,7 @@
 
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rig.errors import BadInputError
 from rig.host.interfaces import sharing_subnet, way_to
@@ -10,16 +10,22 @@ from rig.phrase import phrase
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from service.processes.replayed_log import check_replay
+from svev.doctor.cameras.child import Trial, hear
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 from svev.gige.gvcp import FoundCamera, ask_camera, find_cameras
 from svev.gige.path_probe import SMALL, largest_packet
 
 _ANSWER_S = 1.5
 _GVCP_PORT = 3956
+_TRIAL_S = 15.0
 
 
 def look_at_cameras(rig: RigSettings) -> Iterator[Finding]:
-    """Examine each camera of the rig file, in its order, and cameras that replay a log together."""
+    """Examine each camera of the rig file, in its order, and cameras that replay a log together.
+
+    GigE Vision cameras that answer are opened as a recording opens them, and set back.
+    """
+    ready = []
     if any(camera.backend == "replay" for camera in rig.cameras):
         yield _look_at_log(rig)
     for camera in rig.cameras:
@@ -30,13 +36,36 @@ def look_at_cameras(rig: RigSettings) -> Iterator[Finding]:
             case "aravis" if rig.simulation is not None:
                 yield _look_at_simulated(camera)
             case "aravis":
-                yield (found := _look_at_gige(camera))
-                if found.level is Level.PASS and rig.network.packet_size > SMALL:
-                    yield from _look_at_way(camera, rig.network.packet_size)
+                found = [_look_at_gige(camera)]
+                if found[0].level is Level.PASS and rig.network.packet_size > SMALL:
+                    found += _look_at_way(camera, rig.network.packet_size)
+                yield from found
+                if all(each.level is Level.PASS for each in found):
+                    ready.append(camera.name)
             case "iidc":
                 pass  # `svev.doctor.cameras.firewire` examines these together
             case "replay":
                 pass  # `_look_at_log` examines these together
+    if ready:
+        yield from _try(rig, ready)
+
+
+def look_limit_s(rig: RigSettings) -> float:
+    """Time limit of `look_at_cameras`, s."""
+    return (5.0 + _TRIAL_S) * len(rig.cameras)
+
+
+def _try(rig: RigSettings, names: Sequence[str]) -> Iterator[Finding]:
+    limit_s = _TRIAL_S * len(names)
+    config = Trial(rig=rig, names=tuple(names))
+    heard = hear("trial of cameras", "svev.doctor.cameras.gige_trial", config, limit_s, {})
+    yield from heard.findings
+    if heard.hangs:
+        what, remedy = "{cameras}: not set up within {seconds:g} s", "switch them off and on, and try again"
+        yield failure(Topic.CAMERAS, "check_trial_hangs", what, remedy, cameras=", ".join(names), seconds=limit_s)
+    if heard.broken:
+        what, remedy = "{cameras} cannot be tried: {why}", "report it with this line"
+        yield failure(Topic.CAMERAS, "check_trial_broken", what, remedy, cameras=", ".join(names), why=heard.broken)
 
 
 def look_for_cameras(rig: RigSettings) -> Iterator[Finding]:

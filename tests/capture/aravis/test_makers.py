@@ -52,7 +52,7 @@ class Made:
         self, *, packet_delay: PacketDelay = "auto", wire: Wire | None = None, **settings: Any
     ) -> Iterator[AravisCamera]:
         """The camera, opened by the back end."""
-        wanted = self.rig.cameras[0].model_copy(update={"trigger_input": self._input(), **settings})
+        wanted = self.rig.cameras[0].model_copy(update={"trigger_input": self.input, **settings})
         network, period_ns = (
             self.rig.network.model_copy(update={"packet_delay": packet_delay}),
             self.rig.trigger.period_ns,
@@ -63,7 +63,8 @@ class Made:
         finally:
             camera.close()
 
-    def _input(self) -> str:
+    @property
+    def input(self) -> str:
         """The input that the pulses come in at."""
         return DIALECTS[self.maker].entries.get("TriggerSource", ("Line0",))[0].replace("Any", "Line0")
 

@@ -3,6 +3,8 @@
 import ipaddress
 import random
 import time
+from dataclasses import replace
+from pathlib import Path
 
 from rig.clocks import HostNs
 from rig.errors import BadInputError
@@ -13,9 +15,10 @@ from simrig.gige.imaging.camera_clock import CameraClock, PtpMaster
 from simrig.gige.imaging.sensor import Sensor
 from simrig.gige.imaging.transmitter import Transmitter
 from simrig.gige.protocol.link import Link
+from simrig.gige.registers.described_map import DESCRIPTION_ADDRESS, DescribedMap
 from simrig.gige.registers.genicam import describe
 from simrig.gige.registers.makers import DIALECTS, registers_of
-from simrig.gige.registers.register_map import RegisterMap
+from simrig.gige.registers.register_map import WORD, RegisterMap
 from simrig.gige.registers.register_table import XML_ADDRESS, Identity, all_registers
 from simrig.images.painter import Painter
 from simrig.world.cable import Cable, CableWatch
@@ -104,8 +107,21 @@ def _registers(config: CameraConfig) -> RegisterMap:
     sensor = (config.width, config.height)
     identity = Identity(f"SIM-{address & 0xFFFFFF:06X}", config.name, address, sensor, config.tick_hz, config.resend)
     maker = config.maker
+    if config.description is not None:
+        return _described(config.description, identity)
     xml = describe(registers_of(maker, all_registers(identity, 0)), DIALECTS[maker])
     return RegisterMap(registers_of(maker, all_registers(identity, len(xml))), {XML_ADDRESS: xml})
+
+
+def _described(path: Path, identity: Identity) -> DescribedMap:
+    """The registers of a camera with the description of another."""
+    xml = path.read_bytes()
+    xml += b"\n" * (-len(xml) % WORD)
+    url = f"Local:{path.stem}.xml;{DESCRIPTION_ADDRESS:x};{len(xml):x}"
+    registers = [
+        replace(each, default=url) if each.name == "GevFirstURL" else each for each in all_registers(identity, len(xml))
+    ]
+    return DescribedMap(registers, xml)
 
 
 def _clock(config: CameraConfig, scenario: Scenario, index: int) -> CameraClock:

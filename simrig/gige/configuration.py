@@ -34,6 +34,10 @@ class CameraConfig(StrictModel):
     first_block_id: int = Field(1, ge=1, lt=1 << 63, description="block id of the first frame after each start")
     tick_hz: int = Field(1_000_000_000, ge=1000, le=10_000_000_000, description="ticks of the device clock per second")
     resend: bool = Field(True, description="whether the camera can send lost packets again")
+    description: Path | None = Field(
+        None,
+        description="GenICam description (XML) of another camera, handed out as its own: registers are memory",
+    )
     maker: Maker = Field(Maker.STANDARD, description="whose features the camera has")
     broadcast: str | None = Field(None, description="broadcast address for discovery, e.g. 127.255.255.255")
     line: CableEnd | None = Field(None, description="emulated line that triggers the camera, if its chip is there")

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import pytest
 
@@ -30,6 +30,13 @@ HARMLESS = {
     "TestImageSelector": 0, "TriggerOverlap": 1, "GainRaw": 0, "StreamBytesPerSecond": 124_000_000,
     "LineSelector": 0, "LineInverter": 0, "ShutterMode": 1,
 }  # fmt: skip
+
+
+class OnRig(Protocol):
+    """A camera of a rig, and the ring for its frames."""
+
+    rig: RigSettings
+    ring: CameraRing
 
 
 class Made:
@@ -111,7 +118,8 @@ def test_a_camera_of_any_maker_takes_one_frame_per_pulse_as_the_rig_file_says(ma
         assert periods == pytest.approx([1.0] * 5, abs=0.02)
 
 
-def frames_of(camera: AravisCamera, made: Made, count: int) -> tuple[list[int], list[int]]:
+def frames_of(camera: AravisCamera, made: OnRig, count: int) -> tuple[list[int], list[int]]:
+    """Pulses of the next frames, as their pixels name them, without a gap, and their times by the camera's clock."""
     region, deadline = made.rig.cameras[0].region, host_now() + 20 * NS_PER_S
     pulses, times = list[int](), list[int]()
     while len(pulses) < count:

@@ -39,7 +39,8 @@ from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.lights import Lights
 from service.measuring.queue import Measurings
-from service.recordings.archive import Archive, as_recording
+from service.recordings.archive import Archive
+from service.recordings.describing import as_recording
 from service.recordings.in_progress import Outcome
 from service.recordings.trash_keeper import TrashKeeper
 from service.rehearsals import Rehearser

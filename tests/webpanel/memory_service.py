@@ -56,7 +56,8 @@ from rig.settings.region import RegionLimits
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.measuring.queue import Measurings
-from service.recordings.archive import Archive, as_recording
+from service.recordings.archive import Archive
+from service.recordings.describing import as_recording
 from service.seam.cameras import CloseUp, Preview
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import check_seen, check_stop, tap_guard

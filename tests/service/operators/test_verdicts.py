@@ -11,7 +11,7 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.append_file import storage_error
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, plain
-from service.recordings.archive import verdict
+from service.recordings.verdicts import verdict
 from tests.recorder.logs import ALL_OK, LOST, OK, SHAPE, make_tag, open_writer, write_pulse
 
 

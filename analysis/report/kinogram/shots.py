@@ -1,7 +1,7 @@
 """The five pictures: the jumper at fixed places, cut out of the camera that sees him best, all at the same scale."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
@@ -23,6 +23,8 @@ PLACES_M: Final = (0.0, 5.0, 10.0, 15.0, 20.0)
 WIDTH, HEIGHT = 516, 387
 _MARGIN: Final = 1.2  # around the largest of the five: helmet and hands reach beyond the marked points
 _BESIDE: Final = 24  # grey value beside an image
+_DARK, _LIT = 0.15, 0.3  # of white: pictures with a darker middle grey are brightened, to this one
+_STRONGEST: Final = 0.4  # power of a curve: a stronger one would show little but noise
 _UNEVEN: Final = 1.1  # the way from pulse to pulse changes by less than a tenth in a jump
 
 
@@ -126,7 +128,22 @@ def shots_of(course: Course, measured: JumpMeasurements | None, system: CameraSy
         of_pulse = {} if moment is None else by_pulse.get(moment.pulse, {})
         views.append(None if moment is None else _best(course, moment, images.get(moment.pulse, {}), of_pulse, system))
     width_m = _width_m([view for view in views if view is not None])
-    return [_shot(place, moment, view, width_m) for place, moment, view in zip(PLACES_M, moments, views, strict=True)]
+    shots = [_shot(place, moment, view, width_m) for place, moment, view in zip(PLACES_M, moments, views, strict=True)]
+    return brightened(shots)
+
+
+def brightened(shots: Sequence[Shot]) -> list[Shot]:
+    """The same pictures, brighter if they are very dark: all by one curve, so that they still compare.
+
+    The curve is a power: black stays black and white white, so that markers which shine in the dark are not lost in it.
+    """
+    pictures = [shot.picture for shot in shots if shot.picture is not None]
+    middle = float(np.median(np.concatenate([picture.ravel() for picture in pictures]))) / 255 if pictures else 1.0
+    if middle >= _DARK:
+        return list(shots)
+    power = max(_STRONGEST, float(np.log(_LIT) / np.log(max(middle, 1 / 255))))
+    curve = np.rint(255 * np.linspace(0, 1, 256) ** power).astype(np.uint8)
+    return [shot if shot.picture is None else replace(shot, picture=curve[shot.picture]) for shot in shots]
 
 
 def _moment(course: Course, known: np.ndarray, place: float, step: float) -> Moment | None:

@@ -19,7 +19,7 @@ from analysis.report.kinogram.drawing import draw
 from analysis.report.kinogram.earlier import EarlierJump, read_earlier
 from analysis.report.kinogram.figures import Mark, Word, marks_of, reference_of
 from analysis.report.kinogram.folder import write_kinograms
-from analysis.report.kinogram.shots import PLACES_M, WIDTH, Missing, Shot, moments_of, shots_of
+from analysis.report.kinogram.shots import PLACES_M, WIDTH, Missing, Shot, brightened, moments_of, shots_of
 from analysis.report.overlay import Overlay
 from analysis.result.model import Jump, MeasuredRecording, Quantity, Verdict
 from analysis.scene.camera_system import PlacedCamera
@@ -62,6 +62,22 @@ def _written(result: MeasuredRecording, log: Path, folder: Path, earlier: Sequen
 def _text(page: str) -> str:
     """What a person reads."""
     return " ".join(unescape(re.sub(r"<style>.*?</style>|<[^>]*>", " ", page)).split())
+
+
+def test_very_dark_pictures_are_brightened_all_alike_and_others_stay(shots: list[Shot]) -> None:
+    assert brightened(shots) == shots
+    dark = [replace(shot, picture=None if shot.picture is None else shot.picture // 8) for shot in shots]
+    dark[0] = Shot(PLACES_M[0], Missing.NO_PICTURE)
+    lit = brightened(dark)
+    assert lit[0] is dark[0]
+    curve: dict[int, int] = {}
+    for before, after in zip(dark[1:], lit[1:], strict=True):
+        assert before.picture is not None
+        assert after.picture is not None
+        assert float(np.median(after.picture)) > 3 * float(np.median(before.picture))
+        for grey, lighter in zip(before.picture.ravel().tolist(), after.picture.ravel().tolist(), strict=True):
+            assert curve.setdefault(grey, lighter) == lighter, "one curve for all"
+    assert sorted(curve, key=curve.__getitem__) == sorted(curve)
 
 
 def test_each_picture_is_of_the_pulse_that_is_nearest_to_its_place(shots: list[Shot]) -> None:

@@ -267,6 +267,26 @@ def test_two_jumps_are_compared_aligned_at_both_take_offs_or_by_motion_of_both(
     expect(page.locator("#other")).to_be_hidden()
 
 
+def test_twelve_jumps_of_a_recording_are_one_row_on_a_phone(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    log = write_recording(service.catalogue.directory, "training", (ALL_OK,) * 40, {})
+    (made := log.with_name("made")).mkdir()
+    (made / "jumper.json").write_text(json.dumps({"jumps": []}))
+    keep_result(made, log, tuple(MEASURED.model_copy(update={"jump": n, "ok": n != 9}) for n in range(1, 13)))
+    page = open_page(f"{panel.url}/#/recordings/training/9", width=360, height=780, has_touch=True, is_mobile=True)
+    choice = page.locator("#jump-choice")
+    shown = choice.get_by_role("button", name="Jump 9")
+    expect(shown).to_have_attribute("aria-pressed", "true")
+    expect(shown).to_be_in_viewport(ratio=1)
+    row, button = choice.bounding_box(), shown.bounding_box()
+    assert row is not None
+    assert button is not None
+    assert button["height"] <= row["height"] < 1.5 * button["height"]
+    expect(page.locator("#jump-verdict .mark")).to_have_text("Doubtful")
+    assert_fits_a_phone(page)
+
+
 def test_every_jump_of_a_recording_is_looked_at_and_compared(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:

@@ -175,7 +175,7 @@ function drawResult({ recording: id, state, problem, figures, live, files }) {
   const { text, advice } = failed ? say(failed) : { text: "", advice: "" };
   $("measurement-problem").hidden = !failed;
   $("measurement-problem").replaceChildren(...failed ? [makeMark(failed.level, failed.level, text), ...advice ? [make("p", { class: "advice" }, advice)] : []] : []);
-  const levels = figures.map((jump) => levelOf(jump, live));
+  const levels = figures.slice(place, place + 1).map((jump) => levelOf(jump, live)); // the choice has those of the others
   $("jump-verdict").replaceChildren(...levels.map((level) => makeMark(level, level, t(MARKS[level]))));
   $("measurement-jumps").replaceChildren(...figures.slice(place, place + 1).map((jump) => makeJump(jump, live, figures.length > 1)));
   const [first, rest] = sorted(files.filter((name) => !KINOGRAM.test(name)), place + 1);

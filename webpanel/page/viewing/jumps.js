@@ -51,6 +51,8 @@ export function drawJumps() {
     "button", { type: "button", "aria-pressed": String(number === jumpShown()), "data-level": level, onclick: () => choose(number) },
     icon(level), make("span", {}, t("jump.number", { jump: number })),
   )));
+  const row = $("jump-choice"), shown = row.querySelector('[aria-pressed="true"]');
+  if (shown) row.scrollLeft = shown.offsetLeft - row.offsetLeft - (row.clientWidth - shown.clientWidth) / 2; // the page stays
 }
 
 /** @param {number} number */

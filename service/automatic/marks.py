@@ -120,16 +120,21 @@ class Marks:
                 return
             self._supervisor.commands.ask(at_once(self._supervisor.moved), _NOTED_S)
         except SvevError as error:
-            text = "something moved, but no recording could begin: {why}"
-            self._tell(Level.WARNING, "motion", phrase("event_motion_unrecorded", text, why=error.said))
+            self._not_begun("motion", error.said)
 
     def _crossed(self, time: HostNs) -> None:
         """Begin a recording, because the light barrier is interrupted; its thread goes on whatever happens."""
         try:
             self.mark(_mark("light barrier", time))
         except SvevError as error:
-            text = "the light barrier was interrupted, but no recording could begin: {why}"
-            self._tell(Level.WARNING, "mark", phrase("event_barrier_unrecorded", text, why=error.said))
+            self._not_begun("mark", error.said)
+
+    def _not_begun(self, name: str, why: Phrase) -> None:
+        """Say that a jump came and no recording could begin: an alarm, until the next one begins."""
+        try:
+            self._supervisor.commands.ask(at_once(partial(self._supervisor.not_begun, why)), _NOTED_S)
+        except SvevError:  # the service ends, or does not answer: then the log alone can say it
+            self._tell(Level.WARNING, name, phrase("event_unrecorded", "no recording could begin: {why}", why=why))
 
     def _tell(self, level: Level, name: str, said: Phrase) -> None:
         self._supervisor.hub.tell(Event.now(level, name, said))

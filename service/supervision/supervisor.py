@@ -17,7 +17,7 @@ from rig.errors import ProcessDiedError, StateForbidsError, SvevError
 from rig.events import Event, Level
 from rig.health import Health
 from rig.host.disk import free_bytes
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.settings.region import RegionLimits
 from rig.transport.analysis_messages import JumpMeasured, Measuring
@@ -205,6 +205,11 @@ class Supervisor:
     def moved(self) -> None:
         """Command: note that somebody has come into sight, and that no recording begins for it."""
         self._unrecorded.moved(time.monotonic())
+
+    def not_begun(self, why: Phrase) -> None:
+        """Command: note that a jump came, and that no recording could begin for it, and why."""
+        self._unrecorded.refused(why)
+        self._refresh()
 
     def look(self) -> WarmUp:
         """Command: say how far the rig has come since it was armed."""
@@ -394,7 +399,9 @@ class Supervisor:
     def _refresh(self) -> Status:
         self._dirty, self._pictured = False, time.monotonic()
         waits = self._machine.state is State.ARMED and self.recordings.current is None
-        self._watch.alarms.unrecorded(self._unrecorded.look(self._jumpers.view(), waits=waits, now=self._pictured))
+        recording = self.recordings.current is not None
+        said = self._unrecorded.look(self._jumpers.view(), waits=waits, recording=recording, now=self._pictured)
+        self._watch.alarms.unrecorded(said)
         self._status = self._picture()
         if not self.recordings.opening:
             self._jumpers.announce()

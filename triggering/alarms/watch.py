@@ -12,7 +12,7 @@ from rig.events import PAIRING, TRIGGER, Level
 from rig.health import Health
 from rig.settings.model import RigSettings
 from triggering.alarms.alarm import Alarm
-from triggering.alarms.missing import Missing
+from triggering.alarms.missing import Cause, Missing
 from triggering.alarms.train import Drift, Stopped, spread
 from triggering.pairing.alarms import alarms
 from triggering.sources.choice import trigger_source
@@ -20,10 +20,18 @@ from triggering.sources.choice import trigger_source
 #: What has been seen at one moment is over when so many pulses have come without it.
 _CALM_PULSES: Final = 128
 _STOPPED: Final = "stopped"
+_RATE, _SPREAD = "rate", "spread"
+#: What an overloaded computer gives as well: one cause is one alarm.
+_FOLLOWING: Final = frozenset({_RATE, _SPREAD})
 #: With a larger spread frames may be paired wrongly (`triggering.timeline.pulse_train`).
 _WRONG: Final = "pairing_spread"
 #: What an alarm is about, by the code of what is said; other codes are topics of their own.
-_TOPICS: Final = {"pairing_rate": "rate", "alarm_drift": "rate", _WRONG: "spread", "alarm_spread": "spread"}
+_TOPICS: Final = {"pairing_rate": _RATE, "alarm_drift": _RATE, _WRONG: _SPREAD, "alarm_spread": _SPREAD}
+
+
+def _is_doubtful(alarm: Alarm) -> bool:
+    """Whether a computer that is too slow gives such a warning too; that frames may be paired wrongly counts anyhow."""
+    return alarm.topic in _FOLLOWING and alarm.level is not Level.ERROR
 
 
 @dataclass(slots=True)
@@ -73,9 +81,12 @@ class AlarmWatch:
         Returns:
             The alarms that begin, or become worse; those that end.
         """
-        found: dict[str, Alarm] = {}
+        found, ended = dict[str, Alarm](), self._remembered
         for alarm in self._judge(health, overloaded, now):
             found.setdefault(alarm.topic, alarm)
+        if overloaded or Cause.COMPUTER.value in found:  # it reads clocks late, and loses what tells of rates
+            found = {topic: alarm for topic, alarm in found.items() if not _is_doubtful(alarm)}
+            ended = ended | {topic for topic, known in self._present.items() if _is_doubtful(known.alarm)}
         begun, pulses = [], health.pairing.seen
         for topic, alarm in found.items():
             known = self._present.get(topic)
@@ -90,7 +101,7 @@ class AlarmWatch:
                 known.alarm = alarm
         over = [
             topic for topic, known in self._present.items()
-            if topic not in found and (topic in self._remembered or pulses >= known.pulses + _CALM_PULSES)
+            if topic not in found and (topic in ended or pulses >= known.pulses + _CALM_PULSES)
         ]  # fmt: skip
         return begun, [self._present.pop(topic).alarm for topic in over]
 
@@ -104,9 +115,9 @@ class AlarmWatch:
             yield Alarm(topic, level, PAIRING, said)
         drifted = self._drift.look(health.pairing)
         if drifted is not None:
-            yield Alarm("rate", Level.WARNING, TRIGGER, drifted)
+            yield Alarm(_RATE, Level.WARNING, TRIGGER, drifted)
         if self._one_edge and (apart := spread(health, self._names)) is not None:
-            yield Alarm("spread", Level.WARNING, TRIGGER, apart)
+            yield Alarm(_SPREAD, Level.WARNING, TRIGGER, apart)
         for topic, name, missed in self._missing.look(health, overloaded):
             self._remembered.add(topic)
             yield Alarm(topic, Level.ERROR, name, missed)

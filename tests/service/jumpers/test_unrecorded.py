@@ -1,6 +1,8 @@
 """A jump of which there may be no recording is said."""
 
 from rig.api.start_list import Mark, StartLine, StartList
+from rig.api.statement import Level
+from rig.phrase import plain
 from service.alarms.unrecorded import Unrecorded
 
 LINES = tuple(StartLine(id=bib, bib=str(bib), athlete=f"Jumper {bib}") for bib in (1, 2))
@@ -25,6 +27,18 @@ def test_somebody_who_was_seen_is_said_unless_a_recording_begins_soon() -> None:
     assert watch.look(LIST, waits=True, now=99.0) == said
     assert watch.look(LIST, waits=False, now=100.0) is None
     assert watch.look(LIST, waits=True, now=101.0) is None
+
+
+def test_a_jump_for_which_no_recording_could_begin_is_said_until_one_does() -> None:
+    watch = Unrecorded()
+    watch.refused(plain("the disk is full"))
+    for waits in (True, False):  # whatever the rig does meanwhile
+        said = watch.look(LIST, waits=waits, now=1.0)
+        assert said is not None
+        assert (said.level, said.code) == (Level.ERROR, "alarm_unrecorded_refused")
+        assert said.text == "a jump came, and no recording could begin: the disk is full"
+    assert watch.look(LIST, waits=False, recording=True, now=2.0) is None
+    assert watch.look(LIST, waits=True, now=3.0) is None
 
 
 def test_a_jumper_who_was_called_and_skipped_is_named_until_the_next_recording() -> None:

@@ -241,6 +241,21 @@ def test_a_computer_that_is_too_slow_is_one_alarm_and_no_cable_is_accused_any_mo
     assert str(alarm.said).startswith("frames of K1, K2, K3 get lost, 300 of 900, since this computer is too slow: ")
 
 
+def test_what_a_computer_that_is_too_slow_does_to_rate_and_spread_is_no_alarm_of_its_own() -> None:
+    rig, lost = Running(), {"lost": 10}
+    for _ in range(10):
+        rig.second(rate_hz=30.7, spread_usual_us=1800.0)
+    assert {code for code, _ in rig.told} == {"pairing_rate", "alarm_spread"}
+    for _ in range(3):
+        rig.second(failed=(lost, lost, lost), overloaded=(0, 1, 2), rate_hz=30.7, spread_usual_us=1800.0)
+    assert [alarm.said.code for alarm in rig.watch.present] == ["alarm_computer"]
+    for _ in range(5):  # the alarm of the computer is not over yet
+        rig.second(failed=(lost, lost, lost), rate_hz=30.7, spread_usual_us=1800.0)
+    assert [alarm.said.code for alarm in rig.watch.present] == ["alarm_computer"]
+    rig.second(overloaded=(0, 1, 2), spread_usual_us=9000.0, spread_max_us=9000.0, alarm=True)
+    assert "pairing_spread" in {alarm.said.code for alarm in rig.watch.present}, "that frames are paired wrongly counts"
+
+
 def test_what_two_cameras_have_in_turn_is_one_alarm() -> None:
     rig, lost = Running(), {"lost": 10}
     for _ in range(3):

@@ -80,8 +80,7 @@ export const events = {
   event_marked: ["et hopp er markert av {source}, for {age} s siden"],
   event_motion_on: ["opptak starter av seg selv når noe beveger seg"],
   event_motion_off: ["opptak starter ikke lenger av seg selv"],
-  event_barrier_unrecorded: ["lysporten ble brutt, men ikke noe opptak kunne starte: {why}"],
-  event_motion_unrecorded: ["noe beveget seg, men ikke noe opptak kunne starte: {why}"],
+  event_unrecorded: ["ikke noe opptak kunne starte: {why}"],
 
   event_jump: ["hopp {jump} i {recording}: {verdict}"],
   event_analysis_again: ["det som var galt, er rettet: hoppene måles fra nå av"],

@@ -43,6 +43,7 @@ export const statements = {
   recording_resumed_whole: ["opptaksprosessen ble startet på nytt, og opptaket {before} fortsetter i {recording}: ingen puls mangler", "{before} ble ikke avsluttet, men kan leses; svev recover avslutter det"],
   process_restarted: ["{process} ble startet på nytt {restarts} ganger", "skjer det igjen, sjekk riggen"],
   alarm_unrecorded: ["{who} ble ropt opp, og ingenting ble tatt opp: det siste hoppet er kanskje ikke tatt opp", "har hopperen hoppet nå nettopp, trykk Lagre siste hopp; ellers er det ingenting å gjøre"],
+  alarm_unrecorded_refused: ["et hopp kom, og ikke noe opptak kunne starte: {why}", "har noen hoppet nå nettopp, trykk Lagre siste hopp; ellers er det ingenting å gjøre"],
   alarm_unrecorded_seen: ["noen ble sett mens ingenting ble tatt opp: det siste hoppet er kanskje ikke tatt opp", "har noen hoppet nå nettopp, trykk Lagre siste hopp; ellers er det ingenting å gjøre"],
   alarm_not_measured: ["hoppene tas opp, men måles ikke: {why}", "rett den filen, den leses på nytt av seg selv; nevner [analysis] i riggfilen feil fil, rett det og start tjenesten på nytt"],
 

@@ -1,12 +1,14 @@
 """A jumper without markers is measured with few clicks: a start by hand, the rest is followed in the images."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from analysis.digitizing.desk import Desk
 from bench.analysis.hill_logs import HillLog
-from rig.api.digitizing import TrackOrder
+from rig.api.digitizing import Action, MarkState, PlaceAction, StateAction, TrackOrder
 from tests.analysis.digitizing.hill import clicks, followed, opened, write_jump
 
 START, PULSES = 20, range(13, 33)
@@ -17,12 +19,14 @@ THINGS = ["P1", "P2", "P3", "P4", "right ski", "left ski"]
 def test_twenty_pulses_in_the_air_take_less_than_sixty_clicks(tmp_path: Path) -> None:
     log: HillLog = write_jump(tmp_path, markers=False, seed=111)
     desk = opened(log)
-    made = [click.action() for click in clicks(desk, log, 111, range(START, START + 1), markers=False)]
+    made: list[Action] = [click.action() for click in clicks(desk, log, 111, range(START, START + 1), markers=False)]
+    made += _states([action for action in made if isinstance(action, PlaceAction)])
     assert len(made) < 60
     for action in made:
         desk.session("Anna").act(action)
     for direction, most in ((1, PULSES[-1] - START), (-1, START - PULSES[0])):
         followed(desk, "Anna", TrackOrder(things=THINGS, pulse=START, direction=direction, most=most))
+    _states_stand(desk)
     errors, points, lines = [], 0, 0
     for pulse in PULSES:
         view, truth = desk.view("Anna", pulse), log.truth[pulse]
@@ -40,3 +44,29 @@ def test_twenty_pulses_in_the_air_take_less_than_sixty_clicks(tmp_path: Path) ->
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5  # errors of one start are shared by all its pulses
     assert np.abs(errors).max() < 5
     desk.close()
+
+
+def _states(made: Sequence[PlaceAction]) -> list[Action]:
+    """He says of three points in other pulses that they are hidden, not visible, or where he guesses one."""
+    x, y = next(action.xy for action in made if (action.camera, action.thing) == ("K3", "P4"))
+    guess = PlaceAction(do="place", pulse=START + 4, camera="K3", thing="P4", xy=(x + 30, y), state=MarkState.GUESS)
+    return [
+        StateAction(do="state", pulse=START + 2, camera="K2", thing="P2", state=MarkState.HIDDEN),
+        StateAction(do="state", pulse=START + 3, camera="K1", thing="P1", state=MarkState.NOT_VISIBLE),
+        guess,
+    ]
+
+
+def _states_stand(desk: Desk) -> None:
+    """What he said of points stands, and nothing is computed from it; each other place says how it came about."""
+    coverage = desk.session_view("Anna").coverage
+    for pulse, camera, thing, letter in ((22, "K2", "P2", "h"), (23, "K1", "P1", "n"), (24, "K3", "P4", "g")):
+        assert coverage[thing][camera][pulse] == letter
+        rays = desk.view("Anna", pulse).space[thing].rays
+        assert camera not in rays
+        assert len(rays) == 2
+    said = {letter for cameras in coverage.values() for pulses in cameras.values() for letter in pulses.values()}
+    assert said == set("mthng")
+    for cameras in coverage.values():
+        for pulses in cameras.values():
+            assert pulses.get(START, "m") == "m"  # where he measured, nothing was followed over it

@@ -32,6 +32,10 @@ class AvtRegisters:
         extended_shutter: the exposure can be set in microseconds.
     """
 
+    #: In the first pixels of this row: the cycle time of the bus, the counts of frames and of triggers.
+    row: Final = -1
+    words: Final = 3
+
     def __init__(self, device: Device) -> None:
         self._device = device
         avt = device.vendor_id == AVT_VENDOR_ID and device.has_advanced_registers
@@ -39,7 +43,7 @@ class AvtRegisters:
         self.signs = avt and all(self._has(place) for place in (_SIGNATURE, _FRAME_COUNTER, _TRIGGER_COUNTER))
         self.extended_shutter = avt and self._has(_EXTENDED_SHUTTER)
 
-    def sign_last_line(self) -> None:
+    def sign(self) -> None:
         """Write cycle time, frame and trigger counter into the first pixels of the last line; set both counters to 0.
 
         In the last line, because any lost packet moves it.

@@ -74,9 +74,14 @@ class Need:
 
 
 def is_fixed_format(camera: CameraSettings) -> bool:
-    """Whether the region is the whole image of a fixed format of the standard; any other region needs Format7."""
+    """Whether the region is the whole image of a fixed format of the standard; any other region needs Format7.
+
+    A camera that is to use another mode of Format7 than 0 is to use that.
+    """
     region = camera.region
-    return region.x == region.y == 0 and (region.width, region.height) in FIXED_FORMATS
+    return (
+        camera.iidc.format7_mode == 0 and region.x == region.y == 0 and (region.width, region.height) in FIXED_FORMATS
+    )
 
 
 def framerate_index(rate_hz: float) -> int:

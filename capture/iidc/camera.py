@@ -26,7 +26,8 @@ from capture.iidc.device import Device
 from capture.iidc.dma import DmaRing
 from capture.iidc.library import Dc1394Error
 from capture.iidc.pixels import copier
-from capture.iidc.signature import SIGNATURE_BYTES, ByteOrder, SignatureReader
+from capture.iidc.point_grey import POINT_GREY_VENDOR_ID, PointGreyRegisters
+from capture.iidc.signature import ByteOrder, SignatureReader
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError, SvevError
@@ -52,10 +53,7 @@ class IidcCamera:
         self._settings, self._ring, self._software = settings, ring, software
         self._underruns = self._frames = 0
         self._notices: list[str] = []
-        region = settings.region
-        self._stamped_pixels = StampedPixels(region.height - 1, 0, SIGNATURE_BYTES)
-        self._stamp_at = self._stamped_pixels.row * region.width * settings.format.pixels.size
-        self._exposure_ns = 0 if settings.iidc.trigger_mode else round(settings.exposure_us * NS_PER_US)
+        self._exposure_ns = 0 if settings.iidc.trigger_mode == 1 else round(settings.exposure_us * NS_PER_US)
         self._cleanup = ExitStack()
         try:
             self._connect(settings, rate_hz)
@@ -83,13 +81,20 @@ class IidcCamera:
         self._avt = AvtRegisters(device)
         self._clock: BusClock = PacketTimes()
         self._signatures: SignatureReader | None = None
-        if self._avt.signs and not settings.iidc.signature:
-            self._avt.sign_nothing()
-        elif self._avt.signs:
-            self._avt.sign_last_line()
+        self._signer: AvtRegisters | PointGreyRegisters = self._avt
+        if device.vendor_id == POINT_GREY_VENDOR_ID:
+            self._signer = PointGreyRegisters(device)
+        if self._signer.signs and not settings.iidc.signature:
+            self._signer.sign_nothing()
+        elif self._signer.signs:
+            self._signer.sign()
             self._clock = CycleTimer(device)
             delay_ns = longest_delay_ns(settings, round(NS_PER_S / rate_hz))
-            self._signatures = SignatureReader(delay_ns, pixel_bytes=settings.format.pixels.size)
+            self._signatures = SignatureReader(
+                delay_ns, pixel_bytes=settings.format.pixels.size, words=self._signer.words
+            )
+            self._stamped_pixels = StampedPixels(self._signer.row % settings.region.height, 0, self._signatures.bytes)
+            self._stamp_at = self._stamped_pixels.row * settings.region.width * settings.format.pixels.size
         self._dma = DmaRing(device, settings.iidc.dma_frames, settings.name)
         self._at_close(self._dma.close)
         set_exposure(device, self._avt, settings)
@@ -97,14 +102,16 @@ class IidcCamera:
     @property
     def description(self) -> str:
         """Vendor, model, GUID, format and bandwidth."""
-        signed = "signs its frames" if self._signatures is not None else "no signature, times from packets"
+        signed = "no signature, times from packets"
+        if self._signatures is not None:
+            signed = "signs its frames" if self._signer is self._avt else "numbers and times its frames"
         need = self._format.need
         return f"{self._device.name}, {self._format.name}, {need.units} bandwidth units, {signed}"
 
     @property
     def limits(self) -> RegionLimits | None:
         """See `capture.seam.Camera.limits`."""
-        return region_limits(self._device)
+        return region_limits(self._device, self._settings)
 
     @property
     def byte_order(self) -> ByteOrder | None:
@@ -226,7 +233,7 @@ class IidcCamera:
             device.transmits()
             and device.is_triggered()
             and device.mode() == self._format.mode
-            and (self._signatures is None or self._avt.still_signs())
+            and (self._signatures is None or self._signer.still_signs())
         )
         if not same:
             raise CameraError(

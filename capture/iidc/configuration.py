@@ -40,7 +40,7 @@ class VideoFormat:
         need: its packets and bandwidth.
     """
 
-    mode: VideoMode
+    mode: int
     name: str
     need: Need
 
@@ -92,7 +92,13 @@ def _name(camera: CameraSettings) -> str:
 
 def _format7(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFormat:
     """Set a region of the sensor, in packets just large enough for the rate."""
-    mode, region = VideoMode.FORMAT7_0, camera.region
+    mode, region = _format7_mode(camera), camera.region
+    if mode not in device.modes() and camera.iidc.format7_mode:
+        there = ", ".join(str(each - VideoMode.FORMAT7_0) for each in device.modes() if each >= VideoMode.FORMAT7_0)
+        raise CameraError(
+            f"camera {camera.name} has no mode {camera.iidc.format7_mode} of Format7 (it has {there or 'none'}): "
+            "correct iidc.format7_mode"
+        )
     if mode not in device.modes():
         raise CameraError(
             f"camera {camera.name} has no format of {region.width} x {region.height} at {rate_hz:g} Hz: set its region "
@@ -118,6 +124,11 @@ def _format7(device: Device, camera: CameraSettings, rate_hz: float) -> VideoFor
     return VideoFormat(mode, f"{_name(camera)} from {region.x}, {region.y}", wanted)
 
 
+def _format7_mode(camera: CameraSettings) -> int:
+    """libdc1394's number of the mode of Format7."""
+    return VideoMode.FORMAT7_0 + camera.iidc.format7_mode
+
+
 def _coding(camera: CameraSettings) -> int:
     return COLOR_CODING_MONO16 if _is_deep(camera) else COLOR_CODING_MONO8
 
@@ -125,14 +136,14 @@ def _coding(camera: CameraSettings) -> int:
 def _set_region(device: Device, camera: CameraSettings, packet_bytes: int) -> None:
     region = camera.region
     device.call(
-        "format7_set_roi", VideoMode.FORMAT7_0, _coding(camera), packet_bytes,
+        "format7_set_roi", _format7_mode(camera), _coding(camera), packet_bytes,
         region.x, region.y, region.width, region.height,
     )  # fmt: skip
 
 
-def region_limits(device: Device) -> RegionLimits | None:
-    """Which regions the camera takes; None if it has fixed formats only."""
-    mode = VideoMode.FORMAT7_0
+def region_limits(device: Device, camera: CameraSettings) -> RegionLimits | None:
+    """Which regions the camera takes in its mode of Format7; None if it has fixed formats only."""
+    mode = _format7_mode(camera)
     if mode not in device.modes():
         return None
     width, height = device.pair("format7_get_max_image_size", mode)
@@ -146,7 +157,7 @@ def region_limits(device: Device) -> RegionLimits | None:
 
 def _check_region(device: Device, camera: CameraSettings) -> None:
     """Check the region: cameras round it silently, or refuse it without saying which steps it must have."""
-    if (limits := region_limits(device)) is None:
+    if (limits := region_limits(device, camera)) is None:
         return
     try:
         limits.check(camera.name, camera.region)

@@ -9,7 +9,7 @@ from capture.iidc.bus import Bus, Found, guid_text
 from capture.iidc.structures import (
     FEATURE_MODE_MANUAL,
     FRAMERATE_1_875,
-    TRIGGER_MODE_0,
+    TRIGGER_MODES,
     TRIGGER_SOURCE_0,
     ColorCodings,
     Feature,
@@ -189,10 +189,9 @@ class Device:
         return [int(source) - TRIGGER_SOURCE_0 for source in sources.sources[: sources.num]]
 
     def trigger_modes(self) -> list[int]:
-        """The trigger modes, of 0 to 5, that the camera has."""
-        word = c_uint32()
-        self.call("get_control_registers", _TRIGGER_INQ, byref(word), 1)
-        return [mode for mode in range(6) if word.value & 0x8000 >> mode]
+        """The trigger modes, of 0 to 15, that the camera has."""
+        word = self.read_command(_TRIGGER_INQ)
+        return [mode for mode in range(16) if word & 0x8000 >> mode]
 
     def set_trigger(self, *, mode: int, source: int | None, rising: bool) -> None:
         """Let pulses trigger the camera.
@@ -205,7 +204,7 @@ class Device:
         Raises:
             CameraError: the camera triggers on rising edges only.
         """
-        self.call("external_trigger_set_mode", TRIGGER_MODE_0 + mode)
+        self.call("external_trigger_set_mode", TRIGGER_MODES[mode])
         if source is not None:
             self.call("external_trigger_set_source", TRIGGER_SOURCE_0 + source)
         if self._int("external_trigger_has_polarity"):
@@ -227,6 +226,16 @@ class Device:
         return bool(self._int("external_trigger_get_power"))
 
     # -- the maker's registers -----------------------------------------------------------------------------------
+
+    def read_command(self, offset: int) -> int:
+        """Read a register by its offset from the start of the command registers."""
+        word = c_uint32()
+        self.call("get_control_registers", offset, byref(word), 1)
+        return word.value
+
+    def write_command(self, offset: int, value: int) -> None:
+        """Write such a register."""
+        self.call("set_control_registers", offset, byref(c_uint32(value)), 1)
 
     def read_advanced(self, offset: int) -> int:
         """Read one of the maker's registers."""

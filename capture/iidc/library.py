@@ -33,6 +33,7 @@ _ARGUMENTS: Final[dict[str, tuple[Any, ...]]] = {
     "read_cycle_timer": (CameraPointer, _U32, _U64),
     "reset_bus": (CameraPointer,),
     "get_control_registers": (CameraPointer, c_uint64, _U32, c_uint32),
+    "set_control_registers": (CameraPointer, c_uint64, _U32, c_uint32),
     "get_adv_control_registers": (CameraPointer, c_uint64, _U32, c_uint32),
     "set_adv_control_registers": (CameraPointer, c_uint64, _U32, c_uint32),
     "video_set_transmission": (CameraPointer, c_int),

@@ -1,4 +1,4 @@
-"""Reads the secure image signature that AVT's cameras write into a frame: its trigger time, and whether it is torn.
+"""Reads what cameras write into a frame, AVT's secure image signature: its trigger time, and whether it is torn.
 
 The first twelve bytes of the last line are three words: the cycle time of the bus when the exposure began, the count
 of frames read out, the count of triggers seen. Cameras differ in the order of the bytes in a word, and where pixels
@@ -7,6 +7,9 @@ have 16 bits, the manual leaves open whether the twelve stand one behind the oth
 
 libdc1394 on Linux does not report a frame that has lost a packet: everything behind the gap has moved up, and the
 frame's end is the beginning of the next frame. Then the signature is not where it should be: so torn frames are found.
+
+Point Grey's frame information is read likewise: two words, without triggers, in the first pixels of the frame. What is
+torn behind them is not found, but the frame that vanished is, by the count.
 """
 
 import struct
@@ -18,7 +21,7 @@ from typing import Final
 from capture.iidc.clock import CYCLE_NS, CycleTime, unwrap
 from rig.clocks import NS_PER_S
 
-SIGNATURE_BYTES: Final = 12
+_WORD_BYTES: Final = 4
 
 #: The kernel's time stamps of packets have three bits of seconds only.
 _PACKET_WRAP_NS: Final = 8 * NS_PER_S
@@ -42,10 +45,10 @@ class Places(Enum):
     HIGH = 0, 2  #: the higher byte of each 16-bit pixel, which is sent first
     LOW = 1, 2  #: the lower byte of each 16-bit pixel
 
-    def of(self, line: bytes) -> bytes:
-        """The bytes of the signature."""
+    def of(self, line: bytes, count: int) -> bytes:
+        """The bytes of the signature, of which there are so many."""
         first, step = self.value
-        return line[first::step][:SIGNATURE_BYTES]
+        return line[first::step][:count]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,7 @@ class Signature:
     Attributes:
         trigger_ns: when its exposure began, unwrapped cycle time of the bus.
         frames: frames read out of the sensor, this one included.
-        triggers: triggers seen, including those that came while the camera was busy.
+        triggers: triggers seen, including those that came while the camera was busy; -1: it does not tell.
     """
 
     trigger_ns: int
@@ -70,16 +73,22 @@ class SignatureReader:
         longest_delay_ns: longest time from the beginning of the exposure to the first packet.
         order: order of the bytes, if it is known.
         pixel_bytes: bytes of a pixel, 1 or 2.
+        words: of the signature: 3, or 2 without the count of triggers.
 
     Attributes:
         order: order of the bytes; None until a frame has shown it.
+        bytes: so many bytes, and pixels of the frame, the signature has.
         line_bytes: so many bytes of the last line may hold the signature.
     """
 
-    def __init__(self, longest_delay_ns: int, order: ByteOrder | None = None, *, pixel_bytes: int = 1) -> None:
+    def __init__(
+        self, longest_delay_ns: int, order: ByteOrder | None = None, *, pixel_bytes: int = 1, words: int = 3
+    ) -> None:
         self.order = order
         self._places = Places.TOGETHER if pixel_bytes == 1 else None
-        self.line_bytes = SIGNATURE_BYTES * pixel_bytes
+        self._words = words
+        self.bytes = words * _WORD_BYTES
+        self.line_bytes = self.bytes * pixel_bytes
         self._longest_delay_ns = longest_delay_ns
         self._last: Signature | None = None
         self._refused = 0
@@ -100,7 +109,7 @@ class SignatureReader:
         found = [
             (order, place, signature)
             for order, place in product(orders, places)
-            if (signature := self._try(place.of(data), first_packet_ns, order))
+            if (signature := self._try(place.of(data, self.bytes), first_packet_ns, order))
         ]
         if not found:
             self._refused += 1
@@ -118,7 +127,8 @@ class SignatureReader:
 
     def _try(self, data: bytes, first_packet_ns: int, order: ByteOrder) -> Signature | None:
         """The signature, if it is plausible in this order of bytes."""
-        word, frames, triggers = struct.unpack(f"{order.value}III", data)
+        word, frames, *rest = struct.unpack(f"{order.value}{self._words}I", data)
+        triggers = rest[0] if rest else -1
         time = CycleTime.from_word(word)
         if not time.valid:
             return None

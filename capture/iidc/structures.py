@@ -183,7 +183,8 @@ class Polarity(IntEnum):
 COLOR_CODING_MONO8: Final = 352
 COLOR_CODING_MONO16: Final = 357
 FRAMERATE_1_875: Final = 32  #: each of the next numbers is twice as fast, up to 240
-TRIGGER_MODE_0: Final = 384
+#: libdc1394's numbers of the trigger modes; 6 to 13 are none.
+TRIGGER_MODES: Final = {**{mode: 384 + mode for mode in range(6)}, 14: 390, 15: 391}
 TRIGGER_SOURCE_0: Final = 576
 TRIGGER_SOURCE_SOFTWARE: Final = 580
 FEATURE_MODE_MANUAL: Final = 736

@@ -30,7 +30,14 @@ class IidcSettings(StrictModel):
 
     bus: int = Field(0, ge=0, le=15, description="which FireWire bus: cameras on one card share its bandwidth")
     iso_speed: Literal[100, 200, 400, 800] = Field(400, description="Mbit/s; 800 needs IEEE 1394b throughout")
-    trigger_mode: Literal[0, 1] = Field(0, description="0: the edge triggers, exposure_us long; 1: the level exposes")
+    trigger_mode: Literal[0, 1, 14] = Field(
+        0,
+        description="0: the edge triggers, exposure_us long; 1: the level exposes; 14: as 0, also while the frame "
+        "before is read out (Point Grey)",
+    )
+    format7_mode: int = Field(
+        0, ge=0, le=7, description="mode of Format7 that a region is read in; others than 0 never use a fixed format"
+    )
     signature: bool = Field(True, description="let AVT cameras sign their frames: times, lost and torn frames")
     dma_frames: int = Field(64, ge=64, le=512, description="frames that the kernel holds while the grabber is busy")
     gain_step_db: float = Field(0.0354, gt=0, le=10, description="gain_db of one step of the gain register (Marlin)")

@@ -25,12 +25,12 @@ def host_rom(guid: int) -> tuple[int, ...]:
     return (*_bus_info(guid), *_block(root))
 
 
-def camera_rom(guid: int, vendor: str, model: str) -> tuple[int, ...]:
+def camera_rom(guid: int, vendor: str, model: str, vendor_id: int = AVT) -> tuple[int, ...]:
     """ROM of an IIDC 1.31 camera, in quadlets."""
     version, subversion = _IIDC_1_31
     leaves = _text(vendor), _text(model)
     # Offsets count from the entry itself. Root (3 entries), unit (3), dependent (4) and the leaves follow each other.
-    root = [_VENDOR << 24 | AVT, _CAPABILITY << 24 | _NODE_CAPABILITIES, _UNIT << 24 | 1]
+    root = [_VENDOR << 24 | vendor_id, _CAPABILITY << 24 | _NODE_CAPABILITIES, _UNIT << 24 | 1]
     unit = [_SPECIFIER << 24 | _IIDC, _VERSION << 24 | version, _DEPENDENT << 24 | 1]
     dependent = [
         _COMMAND_REGISTERS << 24 | COMMAND_BASE // 4,

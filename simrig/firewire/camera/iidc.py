@@ -3,7 +3,7 @@
 In Format_7 a program chooses a free region of the sensor and the size of the packets.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 from typing import Final
 
@@ -25,7 +25,9 @@ from simrig.firewire.camera.geometry import (
 ADVANCED_BASE: Final = 0x1000000  #: start of the maker's own registers, from the start of the initial register space
 SIZE: Final = 0x1000  #: of the command registers, bytes
 FORMAT7_CSR: Final = 0xF08000  #: start of the registers of Format_7 Mode_0, likewise
-FORMAT7_SIZE: Final = 0x100  #: their size, bytes
+FORMAT7_SIZE: Final = 0x100  #: their size, bytes; those of Mode_1 follow
+FORMAT7_MODES_INQ: Final = 0x19C  #: inquiry registers that makers extend
+SHUTTER_INQ, TRIGGER_INQ = 0x51C, 0x530
 
 
 class Register(IntEnum):
@@ -49,7 +51,7 @@ _BASIC_FUNC_INQ, _FEATURE_HI_INQ, _ADV_FEATURE_INQ = 0x400, 0x404, 0x480
 _FEATURE_INQ = 0x500 - 0x800  # from a feature's own register to its inquiry register
 _PRESENT, _ABSENT = bit(0), 0
 _ON = bit(6)
-_POLARITY, _LEVEL = bit(7), bit(15)  # in the trigger's register
+_POLARITY = bit(7)  # in the trigger's register
 _READABLE, _SWITCHABLE, _MANUAL = bit(4), bit(5), bit(7)
 _FORMAT_0, _FORMAT_7, _MODE_5, _MODE_6 = 0, 7, 5, 6
 #: Color codings of Format_7: 8 and 16 bits.
@@ -64,7 +66,7 @@ def _range(low: int, high: int) -> int:
 _INQUIRIES: Final[dict[int, int]] = {
     0x100: bit(_FORMAT_0) | bit(_FORMAT_7),
     0x180: bit(_MODE_5) | bit(_MODE_6),
-    0x19C: bit(0),
+    FORMAT7_MODES_INQ: bit(0),
     **{0x200 + 4 * mode: sum(bit(code) for code in RATES_HZ) for mode in (_MODE_5, _MODE_6)},
     0x2E0: FORMAT7_CSR // 4,
     _BASIC_FUNC_INQ: bit(0),  # there are advanced features
@@ -76,6 +78,13 @@ _INQUIRIES: Final[dict[int, int]] = {
     # on/off, polarity, source 0, modes 0 and 1
     Register.TRIGGER_MODE + _FEATURE_INQ: _PRESENT | _READABLE | _SWITCHABLE | bit(6) | bit(8) | bit(16) | bit(17),
 }
+
+
+def standard_inquiry(offset: int) -> int:
+    """What every emulated camera answers at an inquiry register."""
+    return _INQUIRIES[offset]
+
+
 #: After power-up: 640 x 480 at 30 Hz, shutter 40 ms, trigger off.
 _DEFAULTS: Final[dict[int, int]] = {
     Register.CUR_V_FRM_RATE: 4 << 29,
@@ -116,7 +125,7 @@ _REGION_ERROR, _PACKET_ERROR = bit(8), bit(9)
 
 
 class Format7:
-    """Registers of Format_7 Mode_0. A write takes effect at once; VALUE_SETTING says whether the settings are valid.
+    """Registers of a mode of Format_7. A write takes effect at once; VALUE_SETTING says whether the settings are valid.
 
     Args:
         depth: significant bits of 16-bit pixels.
@@ -218,10 +227,14 @@ class CommandRegisters:
     Args:
         on_write: called after each write that has an effect.
         depth: significant bits of 16-bit pixels.
+        inquiries: what the camera says beside, or instead of, what every camera says, by offset.
     """
 
-    def __init__(self, on_write: Callable[[Register, int], None], depth: int) -> None:
-        self.format7 = Format7(depth)
+    def __init__(
+        self, on_write: Callable[[Register, int], None], depth: int, inquiries: Mapping[int, int] | None = None
+    ) -> None:
+        self.format7_modes = (Format7(depth), Format7(depth))
+        self._inquiries = _INQUIRIES | dict(inquiries or {})
         self._depth = depth
         self._on_write = on_write
         self._values: dict[int, int] = dict(_DEFAULTS)
@@ -229,14 +242,15 @@ class CommandRegisters:
     def reset(self) -> None:
         """Set the state after power-up."""
         self._values = dict(_DEFAULTS)
-        self.format7.reset()
-        self.format7.max_packet_bytes = MAX_PACKET_BYTES[self.speed]
+        for mode in self.format7_modes:
+            mode.reset()
+            mode.max_packet_bytes = MAX_PACKET_BYTES[self.speed]
 
     def read(self, offset: int) -> int:
         """Read a register; an offset without a register reads 0."""
         if offset == Register.DATA_DEPTH:
             return self.depth << 24
-        return self._values.get(offset, _INQUIRIES.get(offset, _ABSENT))
+        return self._values.get(offset, self._inquiries.get(offset, _ABSENT))
 
     def write(self, offset: int, value: int) -> None:
         """Write a register; a write to an inquiry register, or where there is none, does nothing."""
@@ -249,7 +263,8 @@ class CommandRegisters:
             return
         register = Register(offset)
         self._values[register] = self._accepted(register, value)
-        self.format7.max_packet_bytes = MAX_PACKET_BYTES[self.speed]
+        for mode in self.format7_modes:
+            mode.max_packet_bytes = MAX_PACKET_BYTES[self.speed]
         self._on_write(register, value)
 
     def _accepted(self, register: Register, value: int) -> int:
@@ -261,8 +276,9 @@ class CommandRegisters:
         accepted = value
         match register:
             case Register.TRIGGER_MODE:
-                level = field(value, 12, 15) == 1
-                accepted = _PRESENT | value & (_ON | _POLARITY) | (_LEVEL if level else 0)
+                mode = field(value, 12, 15)
+                mode = mode if self._inquiries[TRIGGER_INQ] & bit(16 + mode) else 0
+                accepted = with_field(_PRESENT | value & (_ON | _POLARITY), 12, 15, mode)
             case Register.CUR_V_FRM_RATE if field(value, 0, 2) not in RATES_HZ:
                 accepted = self._values[register]
             case Register.CUR_V_FORMAT if field(value, 0, 2) not in {_FORMAT_0, _FORMAT_7}:
@@ -276,10 +292,15 @@ class CommandRegisters:
         return accepted
 
     @property
+    def format7(self) -> Format7:
+        """The registers of the mode of Format_7 that is set."""
+        return self.format7_modes[self._mode]
+
+    @property
     def readout(self) -> Readout | None:
         """The selected readout; None if the settings are not valid."""
         if self._is_format7:
-            return self.format7.readout
+            return self.format7.readout if self._mode < len(self.format7_modes) else None
         if self._mode not in {_MODE_5, _MODE_6}:
             return None
         readout = vga(self.rate_hz, 2 if self._mode == _MODE_6 else 1)

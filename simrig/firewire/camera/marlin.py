@@ -1,4 +1,7 @@
-"""An emulated AVT Marlin F-080B: a node of the bus, with its registers and its sensor."""
+"""An emulated AVT Marlin F-080B: a node of the bus, with its registers and its sensor.
+
+With a GUID of Point Grey's it is a camera of theirs: the same sensor with other registers.
+"""
 
 import struct
 from enum import IntEnum
@@ -12,6 +15,7 @@ from simrig.firewire.camera.advanced import AdvancedRegisters, Signature
 from simrig.firewire.camera.config_rom import COMMAND_BASE, camera_rom
 from simrig.firewire.camera.geometry import Deep, bit
 from simrig.firewire.camera.iidc import CommandRegisters, Register
+from simrig.firewire.camera.point_grey import INQUIRIES, VENDOR_ID, PointGreyRegisters
 from simrig.firewire.camera.sensor import Line, Sensor
 from simrig.firewire.loop import Loop
 from simrig.images.painter import Painter
@@ -20,6 +24,7 @@ from simrig.world.statistics import Counters
 
 VENDOR: Final = "AVT"
 MODEL: Final = "Marlin F080B"
+POINT_GREY: Final = ("Point Grey Research", "Flea2 FL2-08S2M")
 REGISTER_SPACE: Final = 0xFFFFF0000000  #: start of a node's initial register space
 ROM: Final = 0x400
 _QUADLET: Final = 4
@@ -79,13 +84,15 @@ class Camera:
         deep: Deep,
     ) -> None:
         self.guid = guid
-        self.rom = camera_rom(guid, VENDOR, MODEL)
+        point_grey = guid >> 40 == VENDOR_ID
+        names = (*POINT_GREY, VENDOR_ID) if point_grey else (VENDOR, MODEL)
+        self.rom = camera_rom(guid, *names)
         self.counters = Counters()
         self.plugged, self.frozen = True, False
         self._asked = HostNs(0)
         self._faults = faults
-        self._command = CommandRegisters(self._written, deep.depth)
-        self._advanced = AdvancedRegisters(signature, deep.signed_bytes)
+        self._command = CommandRegisters(self._written, deep.depth, INQUIRIES if point_grey else None)
+        self._advanced = PointGreyRegisters() if point_grey else AdvancedRegisters(signature, deep.signed_bytes)
         self._sensor = Sensor(
             loop, line, painter, faults, self._command, self._advanced, self.counters, at_top=deep.at_top
         )
@@ -166,19 +173,25 @@ class Camera:
             return self.rom[(place - ROM) // _QUADLET]
         if 0 <= place - COMMAND_BASE < iidc.SIZE:
             return self._command.read(place - COMMAND_BASE)
-        if 0 <= place - iidc.FORMAT7_CSR < iidc.FORMAT7_SIZE:
-            return self._command.format7.read(place - iidc.FORMAT7_CSR)
+        mode, offset = divmod(place - iidc.FORMAT7_CSR, iidc.FORMAT7_SIZE)
+        if 0 <= mode < len(self._command.format7_modes):
+            return self._command.format7_modes[mode].read(offset)
         if 0 <= place - iidc.ADVANCED_BASE < advanced.SIZE:
             return self._advanced.read(place - iidc.ADVANCED_BASE)
+        if isinstance(self._advanced, PointGreyRegisters):
+            return self._advanced.read_command(place - COMMAND_BASE)
         return None
 
     def _write(self, place: int, value: int) -> bool:
+        mode, offset = divmod(place - iidc.FORMAT7_CSR, iidc.FORMAT7_SIZE)
         if 0 <= place - COMMAND_BASE < iidc.SIZE:
             self._command.write(place - COMMAND_BASE, value)
-        elif 0 <= place - iidc.FORMAT7_CSR < iidc.FORMAT7_SIZE:
-            self._command.format7.write(place - iidc.FORMAT7_CSR, value)
+        elif 0 <= mode < len(self._command.format7_modes):
+            self._command.format7_modes[mode].write(offset, value)
         elif 0 <= place - iidc.ADVANCED_BASE < advanced.SIZE:
             self._advanced.write(place - iidc.ADVANCED_BASE, value)
+        elif isinstance(self._advanced, PointGreyRegisters):
+            return self._advanced.write_command(place - COMMAND_BASE, value)
         else:
             return False
         return True

@@ -7,6 +7,7 @@ from capture.iidc.bandwidth import UNITS_PER_BUS, check_bandwidth, need
 from capture.iidc.bus import Bus, guid_text, why_no_camera
 from capture.iidc.configuration import READOUT_NS
 from capture.iidc.device import Device
+from capture.iidc.point_grey import PointGreyRegisters
 from rig.clocks import NS_PER_US
 from rig.errors import BadInputError, CameraError
 from rig.phrase import phrase
@@ -59,13 +60,16 @@ def _look_at_camera(bus: Bus, camera: CameraSettings) -> Iterator[tuple[Finding,
                 return
             what = "{camera} is {device}"
             yield passed(Topic.CAMERAS, "check_firewire_camera", what, camera=camera.name, device=device.name), camera
-            yield _look_at_signature(camera, AvtRegisters(device)), None
+            yield _look_at_signature(camera, device), None
     except (BadInputError, CameraError) as error:
         yield told(f"{camera.name}, {error}"), None
 
 
-def _look_at_signature(camera: CameraSettings, avt: AvtRegisters) -> Finding:
-    if avt.signs:
+def _look_at_signature(camera: CameraSettings, device: Device) -> Finding:
+    if PointGreyRegisters(device).signs:
+        what = "{camera} can number and time its frames (frame information); torn ones pass as pictures"
+        return passed(Topic.CAMERAS, "check_numbers", what, camera=camera.name)
+    if AvtRegisters(device).signs:
         what = "{camera} can sign its frames (secure image signature)"
         return passed(Topic.CAMERAS, "check_signs", what, camera=camera.name)
     return warning(

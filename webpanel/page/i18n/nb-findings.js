@@ -118,6 +118,7 @@ export const findings = {
   check_firewire_others: ["også på FireWire, men ikke i riggfilen: {others}"],
   check_camera_refuses: ["{what}", "{remedy}"],
   check_camera_sends: ["{camera} ({device}) sender bilder allerede", "avslutt programmet som bruker det (en annen svev?); etter et krasj slår neste opptak det av"],
+  check_numbers: ["{camera} kan nummerere og tidfeste bildene sine (frame information); avrevne bilder godtas"],
   check_signs: ["{camera} kan signere bildene sine (secure image signature)"],
   check_signs_not: ["{camera} kan ikke signere bildene sine: avrevne bilder godtas, tapte regnes som ikke sett", "bruk et AVT-kamera med fastvare 3.03 eller nyere der hvert bilde teller"],
   check_bandwidth: ["båndbredde på FireWire: {taken} av {units} enheter ({each})"],

@@ -38,6 +38,7 @@ NOT_RUN: Final = {
     r"svev import A=|svev import left\.avi": "needs films of other cameras: tests/recorder/importing",
     r"svev compare ": "needs results of three recordings: tests/svev/test_compare.py",
     r"svev analyze old\.mcap": "needs a survey of cameras of those names: tests/recorder/importing",
+    r"svev season |dask ": "needs the logs of a season, or a cluster that goes on: tests/season",
     r"svev network import ": "needs files of other programs: tests/photogrammetry/exchange",
 }
 #: Commands that record at 30 Hz: on a busy computer frames are missing, and exit code 3 says so.

@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench corpus test test-long check style wheel bundle install rollback uninstall lock clean setup system
+.PHONY: help demo run bench corpus test test-long check style wheel bundle install rollback uninstall lock client-tool clean setup system
 
 # Some environments forbid Python to keep what it compiled: then each of the thousands of processes of the tests, and each
 # call of pytest, would compile the program anew.
@@ -25,7 +25,7 @@ SVEV := .venv/.setup-svev
 NPM := $(patsubst %/package-lock.json,%/node_modules/.setup-npm,$(wildcard tests/*/npm/package-lock.json))
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' Makefile
 
 demo: setup ## the main job on the simulated hill: three GigE Vision cameras, one jump, a log and a contact sheet
 	@$(BIN)/svev demo $(ARGS)
@@ -73,6 +73,10 @@ lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
 	@test -x build/uv/bin/uv || { /usr/bin/python3 -m venv build/uv && build/uv/bin/pip install -qq uv; }
 	@build/uv/bin/uv pip compile pyproject.toml --group dev --python-version 3.11 --quiet --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --output-file requirements.lock $(ARGS)
+
+client-tool: ## for the test that makes a client of the REST API: openapi-python-client, in an environment of its own
+	@test -x build/client-tool/bin/openapi-python-client || { /usr/bin/python3 -m venv build/client-tool && \
+	  build/client-tool/bin/pip install -qq openapi-python-client; }
 
 clean: ## remove everything that make made; keep recordings
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

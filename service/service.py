@@ -12,7 +12,7 @@ from prometheus_client.metrics_core import Metric
 
 from recorder.catalogue.folder import Catalogue
 from rig import events
-from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.automatic import AutomaticChange, JumpMark, Marked
 from rig.api.cameras.aids import CameraAids
 from rig.api.cameras.balls import CameraBalls
 from rig.api.cameras.light import CameraLight, LightChange
@@ -183,7 +183,7 @@ class Service(Archive):
 
         return supervisor.commands.ask(start, _OPEN_S)
 
-    def mark(self, mark: Mark) -> Marked:
+    def mark(self, mark: JumpMark) -> Marked:
         """Begin a recording at the mark, with the seconds before; one that runs already only gets the mark."""
         return self._marks.mark(mark)
 

@@ -6,7 +6,7 @@ from rig.api.fields import Line, Model
 from rig.api.recordings import Recording
 
 
-class Mark(Model):
+class JumpMark(Model):
     """Something that happens once per jump: a light barrier, a start gate that opens, a timing system."""
 
     source: Line = Field("", description="what noticed it; it stands in the log", examples=["light barrier"])

@@ -27,7 +27,7 @@ More = Annotated[
 FieldName = Literal["athlete", "bib", "gate", "wind", "notes", "operator"]
 
 
-class Mark(StrEnum):
+class TurnMark(StrEnum):
     """What became of a line of the start list in the present round."""
 
     WAITING = "waiting"
@@ -50,7 +50,7 @@ class StartLine(NewLine):
     """A line of the start list."""
 
     id: LineId
-    mark: Mark = Field(Mark.WAITING, description="in the present round")
+    mark: TurnMark = Field(TurnMark.WAITING, description="in the present round")
     jumps: tuple[str, ...] = Field((), description="ids of his recordings, all rounds, oldest first")
 
 

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from rig.api.start_list import Mark, StartList, who
+from rig.api.start_list import StartList, TurnMark, who
 from rig.api.statement import Level, Statement
 from rig.phrase import Phrase
 
@@ -41,7 +41,7 @@ class Unrecorded:
             recording: whether something is being recorded.
             now: on the monotonic clock, s.
         """
-        skipped = {line.id: line for line in start_list.lines if line.mark is Mark.SKIPPED}
+        skipped = {line.id: line for line in start_list.lines if line.mark is TurnMark.SKIPPED}
         new = skipped.keys() - self._skipped
         self._skipped = frozenset(skipped)
         if recording:

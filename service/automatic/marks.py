@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import Final
 
-from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.automatic import AutomaticChange, JumpMark, Marked
 from rig.api.recordings import Recording, RecordingOrder
 from rig.api.status import AutomaticStatus, Status
 from rig.clocks import NS_PER_S, HostNs, UtcAnchor
@@ -63,7 +63,7 @@ class Marks:
         """Whether the beam of the light barrier is interrupted; None: there is none, or it is not known."""
         return None if self._barrier is None else self._barrier.interrupted()
 
-    def mark(self, mark: Mark) -> Marked:
+    def mark(self, mark: JumpMark) -> Marked:
         """Begin a recording at the mark, with the seconds before; one that runs already only gets the mark.
 
         Raises:
@@ -140,11 +140,11 @@ class Marks:
         self._supervisor.hub.tell(Event.now(level, name, said))
 
 
-def _mark(source: str, time: HostNs) -> Mark:
-    return Mark(source=source, time=datetime.fromtimestamp(UtcAnchor.take().utc(time) / NS_PER_S, UTC))
+def _mark(source: str, time: HostNs) -> JumpMark:
+    return JumpMark(source=source, time=datetime.fromtimestamp(UtcAnchor.take().utc(time) / NS_PER_S, UTC))
 
 
-def _age_s(mark: Mark) -> float:
+def _age_s(mark: JumpMark) -> float:
     """How long ago it happened, s.
 
     Raises:

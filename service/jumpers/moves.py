@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from rig.api.recordings import NextJumper, SessionFields
-from rig.api.start_list import Mark, NewLine, StartLine, StartList
+from rig.api.start_list import NewLine, StartLine, StartList, TurnMark
 from rig.errors import UnknownLineError
 
 
@@ -58,7 +58,7 @@ def advanced(start_list: StartList) -> StartList:
 
 def new_round(start_list: StartList) -> StartList:
     """The list with everybody waiting again, one round later."""
-    lines = tuple(each.model_copy(update={"mark": Mark.WAITING}) for each in start_list.lines)
+    lines = tuple(each.model_copy(update={"mark": TurnMark.WAITING}) for each in start_list.lines)
     return start_list.model_copy(update={"lines": lines, "round": start_list.round + 1})
 
 
@@ -67,7 +67,7 @@ def taken(start_list: StartList, recording: str) -> StartList:
     line = start_list.next.line
     if line is not None:
         found = line_of(start_list, line)
-        update = {"mark": Mark.JUMPED, "jumps": (*found.jumps, recording)}
+        update = {"mark": TurnMark.JUMPED, "jumps": (*found.jumps, recording)}
         start_list = with_line(start_list, found.model_copy(update=update))
     return advanced(start_list) if start_list.auto_advance else start_list
 
@@ -77,7 +77,7 @@ def not_taken(start_list: StartList, recording: str) -> StartList:
     for each in start_list.lines:
         if recording in each.jumps:
             jumps = tuple(jump for jump in each.jumps if jump != recording)
-            return with_line(start_list, each.model_copy(update={"mark": Mark.WAITING, "jumps": jumps}))
+            return with_line(start_list, each.model_copy(update={"mark": TurnMark.WAITING, "jumps": jumps}))
     return start_list
 
 
@@ -93,8 +93,8 @@ def renamed(start_list: StartList, recording: str, name: str) -> StartList:
 def skipped(start_list: StartList) -> StartList:
     """The list after the next jumper was passed over; one who has jumped in this round has jumped."""
     line = start_list.next.line
-    if line is not None and (found := line_of(start_list, line)).mark is Mark.WAITING:
-        start_list = with_line(start_list, found.model_copy(update={"mark": Mark.SKIPPED}))
+    if line is not None and (found := line_of(start_list, line)).mark is TurnMark.WAITING:
+        start_list = with_line(start_list, found.model_copy(update={"mark": TurnMark.SKIPPED}))
     return advanced(start_list)
 
 
@@ -159,7 +159,7 @@ def _waiting_after(start_list: StartList, line: int | None) -> int | None:
     lines = list(start_list.lines)
     place = next((index for index, each in enumerate(lines) if each.id == line), -1)
     ordered = lines[place + 1 :] + lines[: place + 1]
-    return next((each.id for each in ordered if each.mark is Mark.WAITING), None)
+    return next((each.id for each in ordered if each.mark is TurnMark.WAITING), None)
 
 
 def _session_of(line: StartLine) -> tuple[tuple[str, str], ...]:

@@ -5,7 +5,7 @@ from typing import Literal, Protocol
 
 from prometheus_client.metrics_core import Metric
 
-from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.automatic import AutomaticChange, JumpMark, Marked
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.recordings import Recording, RecordingOrder, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
@@ -63,7 +63,7 @@ class RigService(Archive, Cameras, Protocol):
         """Start a recording of the next jumper; returns when its log is open. Only while armed."""
         ...
 
-    def mark(self, mark: Mark) -> Marked:
+    def mark(self, mark: JumpMark) -> Marked:
         """Begin a recording that reaches back to before a mark, or note the mark in the one that runs."""
         ...
 

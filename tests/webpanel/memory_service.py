@@ -16,7 +16,7 @@ from analysis.images.aids import exposure, focus, sharp
 from recorder.catalogue.folder import Catalogue
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.log_writer import LogDescription, LogWriter
-from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.automatic import AutomaticChange, JumpMark, Marked
 from rig.api.cameras.aids import BINS, CameraAids
 from rig.api.cameras.balls import CameraBalls
 from rig.api.cameras.light import CameraLight, LightChange
@@ -247,7 +247,7 @@ class MemoryService(Archive):
             self._become(State.RECORDING)
         return started if order.duration_s is None else self.stop_recording(started.id)
 
-    def mark(self, mark: Mark) -> Marked:
+    def mark(self, mark: JumpMark) -> Marked:
         del mark
         if (running := self._recording) is not None:
             return Marked(started=False, recording=running)

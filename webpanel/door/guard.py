@@ -45,20 +45,23 @@ class _Body:
     most: int = BODY_MAX
 
 
+#: Of programs that know no other kind: the content tells what it is.
+ANY_BYTES: Final = "application/octet-stream"
 _JSON: Final = _Body(re.compile(".*"), "application/json")
 #: Bodies that are something else than JSON; the routes look which call takes what.
 _OTHERS: Final = (
-    _Body(re.compile("/api/start-list(?:/preview)?"), "text/csv", TABLE_BYTES_MAX),
-    _Body(
-        re.compile("/api/start-list(?:/preview)?"),
-        "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
-        TABLE_BYTES_MAX,
+    *(
+        _Body(re.compile("/api/start-list(?:/preview)?"), kind, TABLE_BYTES_MAX)
+        for kind in ("text/csv", "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet", ANY_BYTES)
     ),
     *(
         _Body(re.compile("/api/recordings/[^/]+/digitizing/sessions/[^/]+/import"), kind, MARKS_BYTES_MAX)
         for kind in ("application/json", "text/csv", "application/zip")
     ),
-    _Body(re.compile("/api/recordings/[^/]+/voice-notes"), "audio/webm", VOICE_BYTES_MAX),
+    *(
+        _Body(re.compile("/api/recordings/[^/]+/voice-notes"), kind, VOICE_BYTES_MAX)
+        for kind in ("audio/webm", ANY_BYTES)
+    ),
 )
 
 

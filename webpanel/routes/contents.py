@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rig.api.looking import Moment, NewNote, Note, VoiceNote
 from rig.api.recordings import Pulses, RecordingState
 from service.seam.rig import RigService
+from webpanel.door.guard import ANY_BYTES
 from webpanel.problems import ProblemError
 from webpanel.routes.common import CHANGING, RecordingId, Responses, jpeg_answer, refusals, strict_router
 from webpanel.routes.events import Changes
@@ -144,14 +145,14 @@ def _add_voice_notes(router: APIRouter, service: RigService, changes: Changes) -
         "/recordings/{recording_id}/voice-notes",
         status_code=HTTPStatus.CREATED,
         responses=CHANGING | refusals(404),
-        openapi_extra={"requestBody": {"required": True, "content": _SOUND}},
+        openapi_extra={"requestBody": {"required": True, "content": _SOUND | {ANY_BYTES: _SOUND[_WEBM]}}},
     )
     async def add_voice_note(recording_id: RecordingId, pulse: NotedPulse, request: Request) -> list[VoiceNote]:
         """Keep a spoken note about a pulse: a WebM file of at most 2 MiB, in a folder beside the log.
 
         It goes to the trash and back with the recording, and stands in archives of recordings.
         """
-        if not request.headers.get("content-type", "").startswith(_WEBM):
+        if not request.headers.get("content-type", "").startswith((_WEBM, ANY_BYTES)):
             text = f"the body must be sound: send Content-Type: {_WEBM}"
             raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
         notes = await run_sync(service.add_voice_note, recording_id, pulse, await request.body())

@@ -6,7 +6,7 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Body, Depends, Query, Request, Response
 from pydantic import TypeAdapter
 
-from rig.api.automatic import AutomaticChange, Mark, Marked
+from rig.api.automatic import AutomaticChange, JumpMark, Marked
 from rig.api.fields import LONGEST_LINE, LONGEST_TAG
 from rig.api.recordings import Recording, RecordingOrder, RecordingQuery, SessionChange, Sorting, StopOrder
 from rig.api.statement import Level
@@ -85,13 +85,13 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         return recording
 
     @router.post("/mark", responses=CHANGING | refusals(422))
-    def mark(mark: Mark | None = None) -> Marked:
+    def mark(mark: JumpMark | None = None) -> Marked:
         """A jump begins, says a light barrier or a timing system: record it, with the seconds before.
 
         How many seconds before and after is said by `[automatic]` in the rig file. While a recording runs, the mark is
         written into its log, and nothing else happens: a barrier that a ski breaks twice begins one recording.
         """
-        return service.mark(mark or Mark())
+        return service.mark(mark or JumpMark())
 
     @router.put("/automatic", responses=CHANGING)
     def change_automatic(change: AutomaticChange) -> Status:

@@ -10,6 +10,7 @@ from rig.api.recordings import NextJumper
 from rig.api.start_list import JumperChange, LineChange, NewLine, Preview, Rules, StartList, Turn, UndoOrder
 from service.seam.rig import RigService
 from service.seam.start_list import Jumpers
+from webpanel.door.guard import ANY_BYTES
 from webpanel.problems import ProblemError
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
 
@@ -32,6 +33,7 @@ _TABLE: Final = {
                 "example": "bib;athlete;gate;club\n17;Ola Nordmann;12;Lyn\n18;Kari Hansen;12;Koll\n",
             },
             _XLSX: {"schema": {"type": "string", "format": "binary"}},
+            ANY_BYTES: {"schema": {"type": "string", "format": "binary"}},
         },
     }
 }
@@ -111,7 +113,7 @@ def _add_list(router: APIRouter, jumpers: Jumpers) -> None:
 
 async def _table_in(request: Request) -> bytes:
     content = await request.body()
-    if content and not request.headers.get("content-type", "").startswith((_CSV, _XLSX)):
+    if content and not request.headers.get("content-type", "").startswith((_CSV, _XLSX, ANY_BYTES)):
         text = f"the body must be a table: send Content-Type: {_CSV}, or that of an Excel workbook, {_XLSX}"
         raise ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type", text)
     return content

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rig.api.recordings import RecordingOrder
-from rig.api.start_list import JumperChange, LineChange, Mark, NewLine, Rules, Turn, UndoOrder
+from rig.api.start_list import JumperChange, LineChange, NewLine, Rules, Turn, TurnMark, UndoOrder
 from rig.errors import ChangedMeanwhileError, StateForbidsError, UnknownLineError
 from rig.events import Event
 from service.jumpers.book import JumperBook
@@ -224,7 +224,7 @@ def test_operators_at_once_never_lose_or_double_a_jumper() -> None:
                 case "skip":
                     book.skip(Turn(number=view.next.number))
                 case "choose":
-                    waiting = [line.id for line in view.lines if line.mark is Mark.WAITING]
+                    waiting = [line.id for line in view.lines if line.mark is TurnMark.WAITING]
                     book.choose(rng.choice(waiting or [1]))
                 case "edit":
                     book.change_next(JumperChange(wind=str(index)))

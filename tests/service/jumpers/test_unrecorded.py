@@ -1,6 +1,6 @@
 """A jump of which there may be no recording is said."""
 
-from rig.api.start_list import Mark, StartLine, StartList
+from rig.api.start_list import StartLine, StartList, TurnMark
 from rig.api.statement import Level
 from rig.phrase import plain
 from service.alarms.unrecorded import Unrecorded
@@ -10,7 +10,7 @@ LIST = StartList(lines=LINES)
 
 
 def _skipped(line: int) -> StartList:
-    lines = [each.model_copy(update={"mark": Mark.SKIPPED}) if each.id == line else each for each in LINES]
+    lines = [each.model_copy(update={"mark": TurnMark.SKIPPED}) if each.id == line else each for each in LINES]
     return LIST.model_copy(update={"lines": tuple(lines)})
 
 

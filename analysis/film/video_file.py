@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, Final
 import av
 import numpy as np
 from av.error import FFmpegError
+from av.video.reformatter import ColorRange, Colorspace
 from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 Picture = NDArray[np.unsignedinteger[Any]]
 
 _TIME_BASE: Final = Fraction(1, 1_000_000)
+_BT709, _SRGB = 1, 13  # ITU-T H.273, tables 2 and 3: primaries, and transfer characteristics
 _CONTAINERS: Final[Mapping[str, str]] = {".mp4": "mp4", ".mkv": "matroska", ".webm": "webm"}
 #: Of files that can be written.
 ENDINGS: Final = tuple(_CONTAINERS)
@@ -88,6 +90,11 @@ class VideoFile:
         stream.width, stream.height = self._size
         stream.pix_fmt = codec.pixels[self._given]
         stream.time_base = stream.codec_context.time_base = _TIME_BASE
+        self._coloured = codec.halved
+        if self._coloured:  # without these every player guesses, and grey values differ
+            context = stream.codec_context
+            context.color_range, context.colorspace = ColorRange.MPEG, Colorspace.ITU709
+            context.color_primaries, context.color_trc = _BT709, _SRGB
         self._stream = stream
         self._last_us = -1
         self._finished = False
@@ -97,6 +104,10 @@ class VideoFile:
         self._last_us = max(at_us, self._last_us + 1)
         picture = np.ascontiguousarray(picture[: self._size[1], : self._size[0]])
         frame = av.VideoFrame.from_ndarray(picture, format=self._given)
+        if self._coloured:
+            frame = frame.reformat(
+                format=self._stream.pix_fmt, dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG
+            )
         frame.pts, frame.time_base = self._last_us, _TIME_BASE
         self._file.mux(self._stream.encode(frame))
 

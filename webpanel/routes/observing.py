@@ -1,14 +1,14 @@
-"""The routes for monitoring programs: metrics in the text format of Prometheus, and health."""
+"""The routes for monitoring programs: metrics in the text format of Prometheus or of OpenMetrics, and health."""
 
 from collections import Counter
 from collections.abc import Iterator
 from http import HTTPStatus
-from typing import Final
+from typing import Annotated, Final
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Header, Response
 from fastapi.responses import PlainTextResponse
-from prometheus_client import CollectorRegistry, generate_latest
-from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
+from prometheus_client import CollectorRegistry
+from prometheus_client.exposition import choose_encoder
 from prometheus_client.metrics_core import CounterMetricFamily, Metric
 from prometheus_client.registry import Collector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -48,9 +48,10 @@ class Metrics(Collector):
             requests.add_metric(values, count)
         yield requests
 
-    def text(self) -> bytes:
-        """All metric families in the text format."""
-        return generate_latest(self._registry)
+    def text(self, accepted: str) -> tuple[bytes, str]:
+        """All metric families, and the media type of the format, chosen by an Accept header."""
+        encode, media_type = choose_encoder(accepted)
+        return encode(self._registry), media_type
 
     def count(self, method: str, status: int) -> None:
         """Count one request. Call it from the event loop only."""
@@ -80,9 +81,10 @@ def observing_router(service: RigService, metrics: Metrics) -> APIRouter:
     router = APIRouter(tags=["Observing"], route_class=StrictRoute)
 
     @router.get("/metrics", response_class=PlainTextResponse)
-    def get_metrics() -> Response:
-        """What has been measured, for Prometheus."""
-        return Response(metrics.text(), media_type=CONTENT_TYPE_PLAIN_0_0_4)
+    def get_metrics(accept: Annotated[str, Header(include_in_schema=False)] = "") -> Response:
+        """What has been measured, for Prometheus; in the format of OpenMetrics for those that accept it."""
+        text, media_type = metrics.text(accept)
+        return Response(text, media_type=media_type, headers={"Vary": "Accept"})
 
     @router.get("/healthz", responses=_UNWELL)
     def get_health(response: Response) -> Health:

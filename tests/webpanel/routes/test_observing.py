@@ -1,6 +1,7 @@
 """Metrics as Prometheus reads them, and health."""
 
 import httpx
+from prometheus_client.openmetrics.parser import text_string_to_metric_families as openmetrics
 from prometheus_client.parser import text_string_to_metric_families
 
 from tests.webpanel.memory_service import MemoryService
@@ -26,6 +27,17 @@ def test_prometheus_reads_the_metrics(client: httpx.Client) -> None:
     requests = {tuple(s.labels.values()): s.value for s in families["svev_http_requests"].samples}
     assert requests["GET", "200"] == 1.0
     assert requests["GET", "404"] == 1.0
+
+
+def test_programs_that_accept_openmetrics_get_it(client: httpx.Client) -> None:
+    accepted = "application/openmetrics-text; version=1.0.0, text/plain; version=0.0.4; q=0.5"  # as Prometheus asks
+    answer = client.get("/metrics", headers={"Accept": accepted})
+    assert answer.headers["content-type"].startswith("application/openmetrics-text; version=1.0.0")
+    assert answer.headers["vary"] == "Accept"
+    assert answer.text.endswith("# EOF\n")
+    families = {family.name: family for family in openmetrics(answer.text)}  # type: ignore[no-untyped-call]
+    assert {sample.name for sample in families["svev_frames"].samples} == {"svev_frames_total"}
+    assert families["svev_latency_seconds"].type == "histogram"
 
 
 def test_invented_methods_make_no_series_of_their_own(client: httpx.Client) -> None:

@@ -26,6 +26,7 @@ from rig.host.disk import replace_file
 from rig.host.files import TEXT_MAX, read_whole
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
+from rig.transport.launcher import program_environment
 
 NAME: Final = ".svev-rehearsal.json"
 _LOOK_S: Final = 0.1
@@ -119,7 +120,8 @@ class Rehearser:
     def _made(self, asked: bytes, seconds: float) -> Rehearsal | None:
         """Run the program."""
         try:
-            child = subprocess.Popen(self._program, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            environment = program_environment()
+            child = subprocess.Popen(self._program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
         except OSError as error:
             why = error.strerror or str(error)
             return _failed(phrase("why_no_program", "no program can be started ({why})", why=why), seconds)

@@ -3,10 +3,11 @@
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from select import select
 from typing import Any, Final
+
+from rig.transport.launcher import program_command, program_environment
 
 #: Argument of a program that takes what processor time it gets.
 AT_ONCE: Final = "at-once"
@@ -43,8 +44,10 @@ def run_child(
     Raises:
         OSError: it cannot be started, or has ended by itself.
     """
-    command = [sys.executable, "-m", module, *([] if yielding else [AT_ONCE])]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=inherited) as child:
+    command, environment = [*program_command(module), *([] if yielding else [AT_ONCE])], program_environment()
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=inherited, env=environment
+    ) as child:
         try:
             _write(child, json.dumps(asked))
             return _followed(child, busy, wanted, tell, hold)

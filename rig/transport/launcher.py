@@ -149,7 +149,7 @@ class Launcher:
         """Start one by its command line."""
         ours, theirs = connection()
         with theirs:
-            command = [*_command(_PROGRAM), str(theirs.fileno()), _ROOM]
+            command = [*program_command(_PROGRAM), str(theirs.fileno()), _ROOM]
             descriptors = (theirs.fileno(),)
             return cls(
                 ours,
@@ -226,13 +226,23 @@ def _adopting() -> Iterator[None]:
         prctl(_PR_SET_CHILD_SUBREAPER, 0)
 
 
+def program_command(module: str) -> tuple[str, ...]:
+    """How a program of ours is started: the present folder is left out, where files of users may have our names."""
+    return (sys.executable, "-P", "-m", module)
+
+
+def program_environment() -> dict[str, str]:
+    """The environment of a program of ours: the present one, and the same code as ours wherever we were started."""
+    path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {**os.environ, "PYTHONPATH": path}
+
+
 def _environment() -> dict[str, str]:
-    """The environment of a child: ours, and the same code as ours wherever we were started.
+    """The environment of a child.
 
     Linear algebra runs on one thread: the children share the processors, and the launcher must have one thread only.
     """
-    path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
-    return {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+    return {**program_environment(), "OPENBLAS_NUM_THREADS": "1"}
 
 
 def _read_once(environment: Mapping[str, str]) -> dict[str, str]:
@@ -242,10 +252,6 @@ def _read_once(environment: Mapping[str, str]) -> dict[str, str]:
     """
     read = {name: value for name, value in environment.items() if name.startswith(_READ_ONCE)}
     return read | {"LD_LIBRARY_PATH": ""}
-
-
-def _command(module: str) -> tuple[str, ...]:
-    return (sys.executable, "-P", "-m", module)
 
 
 _the_lock: Final = threading.Lock()
@@ -303,7 +309,7 @@ def start_program(
         output: descriptor of its standard output and error, or those of both; None: ours.
         launches: it will start programs itself, soon after its start.
     """
-    command, environment = (*_command(module), *arguments), {**_environment(), **more}
+    command, environment = (*program_command(module), *arguments), {**_environment(), **more}
     launch = Launch(module, command, inherit, own_group, launches, str(Path.cwd()), environment)
     out, err = output if isinstance(output, tuple) else (output, output)
     return launcher().launch(launch, (1 if out is None else out, 2 if err is None else err)) or subprocess.Popen(

@@ -2,7 +2,6 @@
 
 import logging
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -29,6 +28,7 @@ from rig.phrase import Phrase, phrase, plain
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
 from rig.settings.webhook import WebhookSettings
+from rig.transport.launcher import program_command
 from rig.transport.preview import PreviewSlot
 from rig.transport.recorder_commands import RecorderOptions
 from service.aiming.balls import BallPlaces
@@ -74,7 +74,7 @@ _HOUR_S: Final = 3600.0
 #: At the end the disk gets so long to take the last login or logout.
 _KEEP_S: Final = 1.0
 #: The program that makes a rehearsal.
-REHEARSE: Final = (sys.executable, "-m", "svev.serving.rehearsal_program")
+REHEARSE: Final = program_command("svev.serving.rehearsal_program")
 #: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
 
 

@@ -7,14 +7,13 @@ not take now is counted, and what still matters is sent again later. Linux queue
 
 import logging
 import os
+import socket
 import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Final
-
-from sdnotify import SystemdNotifier  # type: ignore[import-untyped]
 
 from rig.clocks import NS_PER_S
 from rig.events import Event, Level
@@ -64,12 +63,7 @@ class Notify:
     """
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
-        self._notifier = None
-        if "NOTIFY_SOCKET" in environment:
-            self._notifier = SystemdNotifier()
-            if self._notifier.socket is not None:
-                self._notifier.debug = True  # raise errors instead of swallowing them
-                self._notifier.socket.setblocking(False)
+        self._socket = _connected(environment.get("NOTIFY_SOCKET", ""))
         ours = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
         limit_s = float(environment.get("WATCHDOG_USEC", "0")) / _US_PER_S if ours else 0.0
         self._every_s = limit_s / _FEEDS_PER_LIMIT
@@ -101,8 +95,8 @@ class Notify:
 
     def close(self) -> None:
         """Close the socket."""
-        if self._notifier is not None and self._notifier.socket is not None:
-            self._notifier.socket.close()
+        if self._socket is not None:
+            self._socket.close()
 
     def _tell(self, name: str, value: str) -> None:
         self._due[name] = value
@@ -121,12 +115,29 @@ class Notify:
         Returns:
             False if the socket did not take it: systemd does not read, or is gone.
         """
-        if self._notifier is None or self._notifier.socket is None:
+        if self._socket is None:
             return True
         try:
-            # The library encodes in Latin-1; systemd reads UTF-8.
-            self._notifier.notify(state.encode("ascii", "replace").decode("ascii"))
+            self._socket.send(state.encode(errors="replace"))
         except OSError:
             self.unsent += 1
             return False
         return True
+
+
+def _connected(address: str) -> socket.socket | None:
+    """A socket that sends to systemd (sd_notify(3)); None without an address, or if nobody is there.
+
+    Args:
+        address: path of the socket; "@" begins a name that is in no file system.
+    """
+    if not address:
+        return None
+    channel = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    channel.setblocking(False)
+    try:
+        channel.connect(f"\0{address[1:]}" if address.startswith("@") else address)
+    except OSError:
+        channel.close()
+        return None
+    return channel

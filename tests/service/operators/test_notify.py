@@ -118,3 +118,20 @@ def test_silent_without_systemd() -> None:
     notify.status("all is well")
     notify.feed_watchdog()
     notify.close()
+
+
+def test_letters_of_all_languages_arrive_and_names_that_are_in_no_file_system_are_reached(short_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as abstract:
+        name = f"svev-{short_path.name}"
+        abstract.bind(f"\0{name}")
+        abstract.setblocking(False)
+        with closing(Notify({"NOTIFY_SOCKET": f"@{name}"})) as notify:
+            notify.status("armed in Trøndelag")
+        assert _Heard(abstract).listen() == ["STATUS=armed in Trøndelag"]
+
+
+def test_without_systemd_or_where_nobody_listens_nothing_is_sent(short_path: Path) -> None:
+    for environment in ({}, {"NOTIFY_SOCKET": str(short_path / "nobody")}):
+        with closing(Notify(environment)) as notify:
+            notify.ready()
+            assert notify.unsent == 0

@@ -23,6 +23,7 @@ from photogrammetry.network.file import pixel_to_metric
 from photogrammetry.network.model import Image, ImageFrame, ImageObservations, Network, Point, Role
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 _ALIKE = 0.005  # of the image's width: balls displaced alike differ by less, also where the camera rolled a little
 _CHANCE = 1e-3  # that balls agree although they are others
@@ -91,11 +92,30 @@ def _verdict(calibration: Calibration, used: Sequence[str], elsewhere: Sequence[
     """
     if len(used) < _FEWEST_CAMERAS:
         if not elsewhere:
-            raise BadInputError(f"the log has one camera, {used[0]}; two at least are needed to measure in space")
-        where = f"the balls of {' and '.join(elsewhere)} are not" if used else "in no camera are the balls"
+            raise BadInputError(
+                phrase(
+                    "poses_one_camera",
+                    "the log has one camera, {camera}; two at least are needed to measure in space",
+                    camera=used[0],
+                )
+            )
+        if not used:
+            raise BadInputError(
+                phrase(
+                    "poses_all_elsewhere",
+                    "{source}: in no camera are the balls where this calibration has them; name the calibration of "
+                    "these cameras on this hill, or orient the log with --survey",
+                    source=calibration.source,
+                )
+            )
         raise BadInputError(
-            f"{calibration.source}: {where} where this calibration has them; name the calibration of these cameras on "
-            "this hill, or orient the log with --survey"
+            phrase(
+                "poses_elsewhere",
+                "{source}: the balls of {cameras} are not where this calibration has them; name the calibration of "
+                "these cameras on this hill, or orient the log with --survey",
+                source=calibration.source,
+                cameras=" and ".join(elsewhere),
+            )
         )
     return [
         f"camera {name} is left out: its balls are not where {calibration.source} has them, so it was turned far, or "

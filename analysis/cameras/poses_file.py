@@ -23,6 +23,7 @@ from photogrammetry.procedures.calibrated_cameras import read_calibration
 from photogrammetry.reports.result_file import POSE
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
+from rig.phrase import phrase
 from rig.settings.strict_toml import validate
 
 _NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
@@ -81,16 +82,29 @@ class Calibration:
             if name not in self.system.cameras:
                 there = ", ".join(self.system.names)
                 raise BadInputError(
-                    f"{self.source}: camera {name} of the log is missing (there: {there}); name the result of svev "
-                    "orient for these cameras, named as in the log"
+                    phrase(
+                        "poses_no_camera",
+                        "{source}: camera {camera} of the log is missing (there: {there}); name the result of svev "
+                        "orient for these cameras, named as in the log",
+                        source=self.source,
+                        camera=name,
+                        there=there,
+                    )
                 )
             known = self.system[name].camera.size
             if known is None:
                 notes.append(f"{self.source} does not say the image size of camera {name}; taken as that of the log")
             elif known != size:
                 raise BadInputError(
-                    f"{self.source}: camera {name} was oriented with images of {known[0]} x {known[1]} px, those of "
-                    f"the log have {size[0]} x {size[1]} px; orient it with images of this size"
+                    phrase(
+                        "poses_size",
+                        "{source}: camera {camera} was oriented with images of {size} px, those of the log have "
+                        "{here} px; orient it with images of this size",
+                        source=self.source,
+                        camera=name,
+                        size=f"{known[0]} x {known[1]}",
+                        here=f"{size[0]} x {size[1]}",
+                    )
                 )
             placed[name] = replace(self.system[name], camera=replace(self.system[name].camera, size=size))
         notes += [f"camera {n} of the calibration has no image in the log" for n in self.system.names if n not in sizes]
@@ -171,16 +185,29 @@ def read_poses(path: Path) -> Calibration:
     interior = read_calibration(path)
     result = validate(_Result, read_json(path), path)
     if result.image_frame != "pixel":
-        raise BadInputError(f'{path}: "image_frame" is "{result.image_frame}"; cameras of a log need c, x0, y0 in px')
+        raise BadInputError(
+            phrase(
+                "poses_metric",
+                '{path}: "image_frame" is "{frame}"; cameras of a log need c, x0, y0 in px',
+                path=str(path),
+                frame=result.image_frame,
+            )
+        )
     require_metres(result.length_unit, str(path))
     if not result.length_unit and not result.control:
         raise BadInputError(
-            f'{path}: says no "length_unit", and nothing surveyed gives its scale; adjust a network with surveyed '
-            'balls or distances, and with "length_unit": "m"'
+            phrase(
+                "poses_no_scale",
+                '{path}: says no "length_unit", and nothing surveyed gives its scale; adjust a network with surveyed '
+                'balls or distances, and with "length_unit": "m"',
+                path=str(path),
+            )
         )
     images = {name: validate(_Image, body, f"{path}: images.{name}") for name, body in result.images.items()}
     if not images:
-        raise BadInputError(f"{path}: has no images, so no poses; name the result of svev orient")
+        raise BadInputError(
+            phrase("poses_none", "{path}: has no images, so no poses; name the result of svev orient", path=str(path))
+        )
     _require_one_image_each(images, interior, path)
     sigmas: list[dict[str, float]] = []
     placed: dict[str, PlacedCamera] = {}
@@ -212,11 +239,24 @@ def _require_one_image_each(images: Mapping[str, _Image], cameras: Mapping[str, 
     named = [image.camera for image in images.values()]
     for name, image in images.items():
         if image.camera not in cameras:
-            raise BadInputError(f'{path}: images.{name}: camera "{image.camera}" is not listed under "cameras"')
+            raise BadInputError(
+                phrase(
+                    "poses_unlisted",
+                    '{path}: images.{image}: camera "{camera}" is not listed under "cameras"',
+                    path=str(path),
+                    image=name,
+                    camera=image.camera,
+                )
+            )
         if named.count(image.camera) > 1:
             raise BadInputError(
-                f"{path}: camera {image.camera} has several images, so where it stands is open; name the result of "
-                "svev orient, with one image of each camera"
+                phrase(
+                    "poses_images",
+                    "{path}: camera {camera} has several images, so where it stands is open; name the result of svev "
+                    "orient, with one image of each camera",
+                    path=str(path),
+                    camera=image.camera,
+                )
             )
 
 
@@ -238,10 +278,19 @@ def _covariance(
     }
     n = len(joint.parameters)
     if any(len(row) != n for row in joint.covariance) or len(joint.covariance) != n:
-        raise BadInputError(f"{path}: calibration.covariance is not {n} x {n}, as its parameters are; orient again")
+        raise BadInputError(
+            phrase(
+                "poses_covariance",
+                "{path}: calibration.covariance is not {n} x {n}, as its parameters are; orient again",
+                path=str(path),
+                n=n,
+            )
+        )
     whole = np.array(joint.covariance, float).reshape(n, n)
     if np.abs(whole - whole.T).max(initial=0.0) > _ASYMMETRY * np.abs(whole).max(initial=0.0):
-        raise BadInputError(f"{path}: calibration.covariance is not symmetric; orient again")
+        raise BadInputError(
+            phrase("poses_asymmetric", "{path}: calibration.covariance is not symmetric; orient again", path=str(path))
+        )
     rows: Integers = np.array([there.get(key, -1) for key in wanted], np.intp)
     block = np.where((rows >= 0)[:, None] & (rows >= 0), np.pad(whole, (0, 1))[np.ix_(rows, rows)], 0.0)
     return (block + block.T) / 2, []

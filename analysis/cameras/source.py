@@ -12,6 +12,7 @@ from analysis.scene.static_image import StaticImage
 from analysis.scene.survey import Survey, read_survey
 from photogrammetry.procedures.orientation import Orientation
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 Source: TypeAlias = Survey | Calibration
 
@@ -24,7 +25,10 @@ def read_source(survey: Path | None, calibration: Path | None) -> Source:
     """
     if (survey is None) == (calibration is None):
         raise BadInputError(
-            "give either the survey of the balls (--survey) or the poses of the cameras (--calibration)"
+            phrase(
+                "source_which",
+                "give either the survey of the balls (--survey) or the poses of the cameras (--calibration)",
+            )
         )
     return read_survey(survey) if survey is not None else read_poses(Path(calibration or ""))
 

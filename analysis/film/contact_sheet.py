@@ -18,6 +18,7 @@ from rig.clocks import NS_PER_S
 from rig.errors import LogDamagedError
 from rig.frame import FrameStatus
 from rig.images.picture import shown
+from rig.phrase import phrase
 from rig.tag import CameraTag
 from rig.topics import SESSION_METADATA
 
@@ -52,7 +53,13 @@ def write_contact_sheet(log: Path, out: Path, count: int = 12, *, pulses: range 
     with LogReader(log) as reader:
         triplets = [each for each in stored_triplets(reader) if pulses is None or each.tag.pulse in pulses]
         if not triplets:
-            raise LogDamagedError(f"{log}: holds no image that could be shown; look at it with `svev verify`")
+            raise LogDamagedError(
+                phrase(
+                    "export_no_image",
+                    "{log}: holds no image that could be shown; look at it with `svev verify`",
+                    log=str(log),
+                )
+            )
         chosen = liveliest(reader, triplets, count)
         size = _tile_size(triplets[0].tag.shape)
         images = [_shrunk(shown(t.image(reader), t.tag.pixels, coloured=True), size) for t in chosen]

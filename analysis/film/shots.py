@@ -16,6 +16,7 @@ from rig.errors import BadInputError, LogDamagedError
 from rig.frame import FrameStatus
 from rig.images.picture import exported, shown
 from rig.images.pixels import Stored
+from rig.phrase import phrase
 from rig.tag import TripletTag
 
 #: Pulses without a tag that are shown: an hour at 30 Hz. More come from a damaged number, not from lost pulses.
@@ -81,7 +82,14 @@ class Recording:
         known = sorted(pulse for pulse in self._tags if pulse in self.pulses)
         if not known or len(self.pulses) - len(known) > _UNKNOWN_MAX:
             raise LogDamagedError(
-                f"{log}: of the pulses {self.pulses[0]} to {self.pulses[-1]} it has {len(known)}: choose others"
+                phrase(
+                    "export_few_pulses",
+                    "{log}: of the pulses {first} to {last} it has {count}: choose others",
+                    log=str(log),
+                    first=self.pulses[0],
+                    last=self.pulses[-1],
+                    count=len(known),
+                )
             )
         self._known = np.array(known)
 
@@ -119,7 +127,14 @@ class Recording:
     def _shot(self, reader: LogReader, pulse: int, stored: StoredTriplet | None) -> Shot:
         tag = self._tags.get(pulse)
         if tag is not None and (tag.shape, tag.pixels) != (self._shape, self._pixels):
-            raise BadInputError(f"{self.log}: the images change their size at pulse {pulse}: export the parts apart")
+            raise BadInputError(
+                phrase(
+                    "export_sizes",
+                    "{log}: the images change their size at pulse {pulse}: export the parts apart",
+                    log=str(self.log),
+                    pulse=pulse,
+                )
+            )
         image: Stored | None = None
         if stored is not None:
             try:
@@ -155,14 +170,32 @@ def _chosen(found: LogInfo, order: ExportOrder) -> range:
         BadInputError: the log has none of them.
     """
     if found.first is None:
-        raise BadInputError(f"{found.path}: no pulse came in this recording; choose another")
+        raise BadInputError(
+            phrase("export_no_pulse", "{log}: no pulse came in this recording; choose another", log=str(found.path))
+        )
     begin, end = int(found.first.pulse), int(found.ledger.last_pulse)
     first = begin if order.first is None else order.first
     last = end if order.last is None else order.last
     if None not in (order.first, order.last) and first > last:
-        raise BadInputError(f"{found.path}: first pulse {first}, last pulse {last}: that is none; exchange them")
+        raise BadInputError(
+            phrase(
+                "export_turned",
+                "{log}: first pulse {first}, last pulse {last}: that is none; exchange them",
+                log=str(found.path),
+                first=first,
+                last=last,
+            )
+        )
     if not begin <= first <= last <= end:
-        raise BadInputError(f"{found.path}: has pulses {begin} to {end}; choose among them")
+        raise BadInputError(
+            phrase(
+                "export_outside",
+                "{log}: has pulses {first} to {last}; choose among them",
+                log=str(found.path),
+                first=begin,
+                last=end,
+            )
+        )
     return range(first, last + 1)
 
 
@@ -175,5 +208,13 @@ def _blocks(found: LogInfo, order: ExportOrder) -> dict[str, tuple[int, int]]:
     there = {} if found.first is None else {camera.name: camera.columns for camera in found.first.cameras}
     for name in order.cameras:
         if name not in there:
-            raise BadInputError(f"{found.path}: has no camera {name}; choose among {', '.join(there)}")
+            raise BadInputError(
+                phrase(
+                    "export_no_camera",
+                    "{log}: has no camera {camera}; choose among {cameras}",
+                    log=str(found.path),
+                    camera=name,
+                    cameras=", ".join(there),
+                )
+            )
     return {name: there[name] for name in order.cameras or there}

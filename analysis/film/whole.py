@@ -12,6 +12,7 @@ from av.error import FFmpegError
 
 from rig.errors import BadInputError, StorageError
 from rig.host.file_names import unfinished_path
+from rig.phrase import phrase
 
 #: What the disk refuses although the place is right: full, quota used up, file too large, hardware error.
 _DISK: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
@@ -47,7 +48,9 @@ def whole_folder(out: Path) -> Iterator[Path]:
         BadInputError: `out` cannot be written, or is there already with something in it.
     """
     if out.is_dir() and any(out.iterdir()):
-        raise BadInputError(f"{out}: holds files already; name a new folder")
+        raise BadInputError(
+            phrase("export_folder_full", "{path}: holds files already; name a new folder", path=str(out))
+        )
     part = unfinished_path(out, _UNFINISHED)
     try:
         with _in_one_line(out):
@@ -66,7 +69,27 @@ def _in_one_line(out: Path) -> Iterator[None]:
         yield
     except (FFmpegError, OSError) as error:
         if error.errno in {errno.ENOSPC, errno.EDQUOT}:
-            raise StorageError(f"{out}: the disk is full: make room on it or write to another one") from None
+            raise StorageError(
+                phrase(
+                    "export_disk_full",
+                    "{path}: the disk is full: make room on it or write to another one",
+                    path=str(out),
+                )
+            ) from None
         if error.errno in _DISK:
-            raise StorageError(f"{out}: the disk refuses ({error.strerror}): write to another one") from None
-        raise BadInputError(f"{out}: cannot be written ({error.strerror}); choose another place") from None
+            raise StorageError(
+                phrase(
+                    "export_disk_refuses",
+                    "{path}: the disk refuses ({why}): write to another one",
+                    path=str(out),
+                    why=error.strerror or str(error),
+                )
+            ) from None
+        raise BadInputError(
+            phrase(
+                "export_unwritable",
+                "{path}: cannot be written ({why}); choose another place",
+                path=str(out),
+                why=error.strerror or str(error),
+            )
+        ) from None

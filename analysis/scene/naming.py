@@ -25,6 +25,7 @@ from photogrammetry.geometry.camera_model import undistort
 from photogrammetry.network.model import Camera
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 GATE: Final = float(chdtri(2, 0.001))
 MODEL_SIGMA: Final = 0.1  #: px; what the interior orientation and the balls' shape may leave out
@@ -101,9 +102,16 @@ def name_balls(camera: Camera, spots: Spots, known: KnownPoints, approximate: Ap
     if camera.size is None:
         raise BadInputError(f'camera {camera.name}: key "size" is missing; give [width, height]')
     if len(spots) < FEWEST:
-        raise NotNamedError(f"{len(spots)} balls found, at least {FEWEST} are needed; clear or light more balls")
+        raise NotNamedError(
+            phrase(
+                "naming_few",
+                "{count} balls found, at least {fewest} are needed; clear or light more balls",
+                count=len(spots),
+                fewest=FEWEST,
+            )
+        )
     if not spread_triples(known.xyz, 1):
-        raise NotNamedError("the surveyed balls lie on a line: survey one beside it")
+        raise NotNamedError(phrase("naming_line", "the surveyed balls lie on a line: survey one beside it"))
     return _Image(camera, camera.size, spots, known).named(approximate)
 
 
@@ -293,28 +301,48 @@ class _Image:
 
     def _judged(self, found: Sequence[Naming], chances: float) -> Naming:
         """The best hypothesis, if it is convincing, alone and determined."""
-        n, spots = len(self.known.names), f"{len(self.spots)} round spots found"
         if not found or found[0].decades - chances < _BELIEVED:
-            best = f"at best {len(found[0].points)} by some pose, which may be chance" if found else "none by any pose"
+            best = phrase("naming_none_fit", "none by any pose")
+            if found:
+                best = phrase(
+                    "naming_best_fit", "at best {count} by some pose, which may be chance", count=len(found[0].points)
+                )
             raise NotNamedError(
-                f"{spots}, which do not fit the {n} surveyed balls ({best}); check survey and interior orientation, "
-                "clear the balls, or give an approximate pose"
+                phrase(
+                    "naming_unfit",
+                    "{spots} round spots found, which do not fit the {balls} surveyed balls ({best}); check survey and "
+                    "interior orientation, clear the balls, or give an approximate pose",
+                    spots=len(self.spots),
+                    balls=len(self.known.names),
+                    best=best,
+                )
             )
         best_one = found[0]
         rival = next((other for other in found[1:] if not _same_names(best_one, other)), None)
         if rival is not None and rival.decades > best_one.decades - _CLEARLY:
             raise NotNamedError(
-                f"{spots}, which fit the surveyed balls in two ways ({len(best_one.points)} and "
-                f"{len(rival.points)} balls, X0 {_words(best_one)} and {_words(rival)}), so names are ambiguous; "
-                "show more balls, or give an approximate pose"
+                phrase(
+                    "naming_ambiguous",
+                    "{spots} round spots found, which fit the surveyed balls in two ways ({one} and {other} balls, X0 "
+                    "{here} and {there}), so names are ambiguous; show more balls, or give an approximate pose",
+                    spots=len(self.spots),
+                    one=len(best_one.points),
+                    other=len(rival.points),
+                    here=_words(best_one),
+                    there=_words(rival),
+                )
             )
         centre = self.known.xyz[best_one.points].mean(axis=0)
         distance = float(np.linalg.norm(best_one.pose.position - centre))
         sigma = np.sqrt(np.diagonal(best_one.pose.covariance))
         if sigma[:3].max() > _DISTANCE_SIGMA * distance or sigma[3:].max() > _ANGLE_SIGMA:
             raise NotNamedError(
-                f"the {len(best_one.points)} balls named do not fix the pose, because they lie nearly on a line; "
-                "show balls beside it"
+                phrase(
+                    "naming_no_pose",
+                    "the {count} balls named do not fix the pose, because they lie nearly on a line; show balls "
+                    "beside it",
+                    count=len(best_one.points),
+                )
             )
         return best_one
 

@@ -26,6 +26,8 @@ from photogrammetry.network.model import Camera, Image, Network, Role
 from photogrammetry.procedures.orientation import Orientation, orient
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import Phrase, phrase
+from rig.phrases import in_turn
 
 _FEWEST_CAMERAS = 2
 #: How far off an approximate pose may be that says nothing about it: part of the distance to the balls, and an angle.
@@ -90,7 +92,7 @@ class Scene:
     network: Network
     orientation: Orientation
     static: Mapping[str, StaticImage]
-    failures: Mapping[str, str]
+    failures: Mapping[str, Phrase]
     messages: tuple[str, ...]
 
 
@@ -136,13 +138,23 @@ def orient_images(
     if len(namings) < _FEWEST_CAMERAS:
         if not namings and views and _fits_mirrored(next(iter(views.values())), known):  # one tells, and takes seconds
             raise BadInputError(
-                f"{survey.source}: the images show the surveyed balls as in a mirror: its axes are left-handed, as "
-                "where north stands before east; interchange two columns of the coordinates, or change the sign of one"
+                phrase(
+                    "survey_mirrored",
+                    "{source}: the images show the surveyed balls as in a mirror: its axes are left-handed, as where "
+                    "north stands before east; interchange two columns of the coordinates, or change the sign of one",
+                    source=survey.source,
+                )
             )
-        reasons = "; ".join([*strange.values(), *(f"camera {name}: {reason}" for name, reason in failures.items())])
-        raise BadInputError(
-            reasons or f"{survey.source}: the log has one camera; two at least are needed to measure in space"
+        reasons = [
+            phrase("camera_unnamed", "camera {camera}: {why}", camera=name, why=reason)
+            for name, reason in failures.items()
+        ]
+        alone = phrase(
+            "survey_one_camera",
+            "{source}: the log has one camera; two at least are needed to measure in space",
+            source=survey.source,
         )
+        raise BadInputError(in_turn([*strange.values(), *reasons] or [alone]))
     network, notes = measured_network(views, namings, ties, survey, known)
     orientation = orient(network, uncertain_interior=True)
     lit = with_lit_balls(network, orientation, static, found)
@@ -178,15 +190,15 @@ def _approximate(image: Image | None, known: KnownPoints) -> Approximate | None:
     return Approximate(image.position, image.rotation, off, angle)
 
 
-def _named(views: Mapping[str, View], known: KnownPoints) -> tuple[dict[str, Naming], dict[str, str]]:
+def _named(views: Mapping[str, View], known: KnownPoints) -> tuple[dict[str, Naming], dict[str, Phrase]]:
     """Names per camera, and why there are none."""
     namings: dict[str, Naming] = {}
-    failures: dict[str, str] = {}
+    failures: dict[str, Phrase] = {}
     for name, view in views.items():
         try:
             namings[name] = _named_view(view, known)
         except NotNamedError as error:
-            failures[name] = str(error)
+            failures[name] = error.said
     return namings, failures
 
 
@@ -270,7 +282,7 @@ def scene_of(
     network: Network,
     orientation: Orientation,
     static: Mapping[str, StaticImage],
-    failures: Mapping[str, str],
+    failures: Mapping[str, Phrase],
     messages: Sequence[str],
 ) -> Scene:
     """The scene of an oriented network with one image of each camera."""

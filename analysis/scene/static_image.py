@@ -23,6 +23,7 @@ from rig.arrays import Floats
 from rig.errors import LogDamagedError
 from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable
+from rig.phrase import phrase
 
 GreyImage = NDArray[np.float32]
 
@@ -88,7 +89,13 @@ def static_images(log: Path, pulses: range | None = None, frames: int = FRAMES) 
     with LogReader(log) as reader:
         stored = [t for t in stored_triplets(reader) if pulses is None or t.tag.pulse in pulses]
         if not stored:
-            raise LogDamagedError(f"{log}: holds no image that could be measured; look at it with `svev verify`")
+            raise LogDamagedError(
+                phrase(
+                    "log_no_image",
+                    "{log}: holds no image that could be measured; look at it with `svev verify`",
+                    log=str(log),
+                )
+            )
         rows, columns = stored[0].tag.shape
         pixel = 4 if stored[0].tag.pixels.bits > 8 else 1  # bytes
         count = max(_FEWEST, min(frames, _MEMORY // (rows * columns * pixel)))
@@ -196,7 +203,13 @@ def _image(triplet: StoredTriplet, reader: LogReader, log: Path) -> Grey:
         return measurable(triplet.image(reader), triplet.tag.pixels)
     except ValueError as error:
         raise LogDamagedError(
-            f"{log}: the image of pulse {triplet.tag.pulse} is damaged ({error}); see which are with `svev verify`"
+            phrase(
+                "log_image_damaged",
+                "{log}: the image of pulse {pulse} is damaged ({why}); see which are with `svev verify`",
+                log=str(log),
+                pulse=int(triplet.tag.pulse),
+                why=str(error),
+            )
         ) from None
 
 

@@ -14,6 +14,7 @@ from photogrammetry.network.model import Camera, Image, ImageFrame, Network, Rol
 from photogrammetry.network.strict_text import read_object
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import Phrase, phrase
 
 _SURVEYED = (Role.CONTROL, Role.FIXED)
 _FEWEST = 4  # surveyed balls
@@ -78,12 +79,18 @@ class Survey:
         """Whether it has a camera's interior orientation."""
         return any(there.name == camera for there in self.network.cameras)
 
-    def lacks(self, camera: str) -> str:
-        """Words for a camera that it has not."""
+    def lacks(self, camera: str) -> Phrase:
+        """Says that it has not a camera."""
         there = ", ".join(camera.name for camera in self.network.cameras) or "none"
-        return f"{self.source}: camera {camera} of the log is missing (there: {there}); name the cameras as in the log"
+        return phrase(
+            "survey_no_camera",
+            "{source}: camera {camera} of the log is missing (there: {there}); name the cameras as in the log",
+            source=self.source,
+            camera=camera,
+            there=there,
+        )
 
-    def cameras_of(self, sizes: Mapping[str, tuple[int, int]]) -> tuple[dict[str, Camera], dict[str, str]]:
+    def cameras_of(self, sizes: Mapping[str, tuple[int, int]]) -> tuple[dict[str, Camera], dict[str, Phrase]]:
         """The cameras of a log, and for those that it has not why there is none.
 
         Args:
@@ -98,10 +105,17 @@ class Survey:
                 continue
             camera = cameras[name] = self.camera(name)
             if camera.size != here:
-                size = "unknown size" if camera.size is None else f"{camera.size[0]} x {camera.size[1]} px"
+                size = "?" if camera.size is None else f"{camera.size[0]} x {camera.size[1]}"
                 raise BadInputError(
-                    f"{self.source}: camera {name} is calibrated for images of {size}, those of the log have "
-                    f"{here[0]} x {here[1]} px; give the interior orientation of this image size"
+                    phrase(
+                        "survey_size",
+                        "{source}: camera {camera} is calibrated for images of {size} px, those of the log have "
+                        "{here} px; give the interior orientation of this image size",
+                        source=self.source,
+                        camera=name,
+                        size=size,
+                        here=f"{here[0]} x {here[1]}",
+                    )
                 )
         return cameras, {name: self.lacks(name) for name in sizes if name not in cameras}
 
@@ -134,28 +148,54 @@ def read_survey(path: Path) -> Survey:
         if path.suffix.lower() not in _TABLES or not isinstance(error.__context__, json.JSONDecodeError):
             raise
         raise BadInputError(
-            f"{path}: is a table of points, and a survey holds the cameras too; make one of both: svev network import "
-            f"K1.yml K2.yml K3.yml {path} -o survey.json"
+            phrase(
+                "survey_table",
+                "{path}: is a table of points, and a survey holds the cameras too; make one of both: svev network "
+                "import K1.yml K2.yml K3.yml {path} -o survey.json",
+                path=str(path),
+            )
         ) from None
     if data.get("observations"):
         raise BadInputError(
-            f'{path}: has "observations", so it is a measured network and no survey; remove them, or use svev orient'
+            phrase(
+                "survey_observations",
+                '{path}: has "observations", so it is a measured network and no survey; remove them, or use svev '
+                "orient",
+                path=str(path),
+            )
         )
     data = data | {"cameras": _with_uncertain_estimated(data.get("cameras"))}
     network = network_from_json({"images": {}, "observations": [], **data}, str(path))
     if network.image_frame is not ImageFrame.PIXEL:
-        raise BadInputError(f'{path}: "image_frame" is "metric"; a survey for a log needs c, x0, y0 in px: "pixel"')
+        raise BadInputError(
+            phrase(
+                "survey_metric",
+                '{path}: "image_frame" is "metric"; a survey for a log needs c, x0, y0 in px: "pixel"',
+                path=str(path),
+            )
+        )
     require_metres(network.length_unit, str(path))
     cameras = [image.camera for image in network.images]
     for camera in cameras:
         if cameras.count(camera) > 1:
             raise BadInputError(
-                f"{path}: camera {network.cameras[camera].name} has several images; give one approximate pose at most"
+                phrase(
+                    "survey_images",
+                    "{path}: camera {camera} has several images; give one approximate pose at most",
+                    path=str(path),
+                    camera=network.cameras[camera].name,
+                )
             )
     count = sum(p.role in _SURVEYED for p in network.points)
     if count < _FEWEST:
         raise BadInputError(
-            f"{path}: has {count} surveyed balls (control or fixed); a camera needs at least {_FEWEST} in sight"
+            phrase(
+                "survey_few_balls",
+                "{path}: has {count} surveyed balls (control or fixed); a camera needs at least {fewest} in sight",
+                path=str(path),
+                count=count,
+                fewest=_FEWEST,
+            )
         )
     survey = Survey(network, str(path))
     _check_apart(survey.surveyed(), survey.source)
@@ -174,8 +214,13 @@ def require_metres(unit: str, source: str) -> None:
     """
     if unit.strip().lower() not in _METRES:
         raise BadInputError(
-            f'{source}: "length_unit" is "{unit}", but jumps are measured in metres; write coordinates and sigmas in '
-            'metres, and "length_unit": "m"'
+            phrase(
+                "survey_unit",
+                '{source}: "length_unit" is "{unit}", but jumps are measured in metres; write coordinates and sigmas '
+                'in metres, and "length_unit": "m"',
+                source=source,
+                unit=unit,
+            )
         )
 
 
@@ -191,8 +236,13 @@ def check_lengths(radius: float | None, source: str) -> None:
     """
     if radius is not None and not _RADII_M[0] <= radius <= _RADII_M[1]:
         raise BadInputError(
-            f"{source}: with these coordinates the balls in the images are {2 * radius:.2g} m across, so they are not "
-            "in metres; write coordinates and their sigmas in metres"
+            phrase(
+                "survey_no_metres",
+                "{source}: with these coordinates the balls in the images are {size:.2g} m across, so they are not "
+                "in metres; write coordinates and their sigmas in metres",
+                source=source,
+                size=2 * radius,
+            )
         )
 
 
@@ -201,7 +251,13 @@ def _check_apart(known: KnownPoints, source: str) -> None:
     for i, j in combinations(range(len(known.names)), 2):
         if not (known.xyz[i] - known.xyz[j]).any():
             raise BadInputError(
-                f"{source}: balls {known.names[i]} and {known.names[j]} have the same coordinates; correct one of them"
+                phrase(
+                    "survey_same_place",
+                    "{source}: balls {one} and {other} have the same coordinates; correct one of them",
+                    source=source,
+                    one=known.names[i],
+                    other=known.names[j],
+                )
             )
 
 

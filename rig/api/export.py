@@ -9,6 +9,7 @@ from typing import Annotated, Final
 from pydantic import Field
 
 from rig.api.fields import WHOLE, Model
+from rig.phrase import Phrase
 
 _CAMERAS_MAX: Final = 8
 _PulseNumber = Annotated[int, Field(ge=1, le=2**53), WHOLE]
@@ -76,4 +77,4 @@ class ExportJob(Model):
     pulses: int = Field(0, description="pulses to do; 0: not known yet")
     name: str = Field(description="of the file")
     bytes: int = Field(0, description="size of the file when it is done")
-    problem: str = Field("", description="why it failed, and what to do")
+    problem: Phrase | None = Field(None, description="why it failed, and what to do")

@@ -21,7 +21,7 @@ from rig.api.cameras.balls import BallPlace, BallSource, CameraBalls
 from rig.api.statement import Level, Statement
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from rig.settings.region import calibration_unfit
@@ -77,7 +77,7 @@ def _found(rig: RigSettings, camera: CameraSettings, folder: Path, nothing: Came
     if given is not None and given.calibration is not None:
         balls = _of_calibration(read_poses(given.calibration), camera)
         return _told(nothing, BallSource.CALIBRATION, balls, given.calibration)
-    lacking: str | None = None
+    lacking: Phrase | None = None
     if given is not None and given.survey is not None:
         survey = read_survey(given.survey)
         kept = kept_in(folder).get(camera.name)
@@ -90,7 +90,7 @@ def _found(rig: RigSettings, camera: CameraSettings, folder: Path, nothing: Came
             return _told(nothing, BallSource.SURVEY, approximate, given.survey)
     if rig.plan is not None:
         planned = _told(nothing, BallSource.PLAN, _of_plan(rig.plan, camera), rig.plan)
-        return planned if lacking is None else planned.model_copy(update={"statement": _by_plan(camera, lacking)})
+        return planned if lacking is None else planned.model_copy(update={"statement": _by_plan(camera, str(lacking))})
     if lacking is not None:
         raise BadInputError(lacking)
     return None

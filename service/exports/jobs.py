@@ -16,7 +16,7 @@ from rig.api.export import ENDINGS, ExportJob, ExportOrder, ExportState
 from rig.background.child import run_child
 from rig.errors import StateForbidsError, StorageError, UnknownExportError
 from rig.host.files import make_folder
-from rig.phrase import Phrase, phrase
+from rig.phrase import Phrase, from_plain, phrase
 
 FOLDER: Final = ".exports"
 #: A file is kept for so long, unless its room is needed.
@@ -70,12 +70,21 @@ class Exports:
         self.tidy(needed)
         if self._room() < needed:
             raise StorageError(
-                f"an export may take {needed / 1e9:.1f} GB, which the disk has not: delete recordings and empty the "
-                "trash"
+                phrase(
+                    "export_no_room",
+                    "an export may take {gb:.1f} GB, which the disk has not: delete recordings and empty the trash",
+                    gb=needed / 1e9,
+                )
             )
         with self._lock:
             if self._closed.is_set() or sum(job.state not in _OVER for job in self._jobs.values()) >= _QUEUE_MAX:
-                raise StateForbidsError(f"{_QUEUE_MAX} exports are waiting already: wait, or cancel some")
+                raise StateForbidsError(
+                    phrase(
+                        "export_queue_full",
+                        "{count} exports are waiting already: wait, or cancel some",
+                        count=_QUEUE_MAX,
+                    )
+                )
             job_id = str(next(self._numbers))
             file = f"{name}{ENDINGS[order.kind] or '.zip'}"
             job = ExportJob(id=job_id, recording=recording_id, order=order, state=ExportState.WAITING, name=file)
@@ -99,7 +108,13 @@ class Exports:
         """
         with self._lock:
             if job_id not in self._jobs:
-                raise UnknownExportError(f"no export {job_id}: it was removed, or never asked for; ask for it again")
+                raise UnknownExportError(
+                    phrase(
+                        "export_unknown",
+                        "no export {export}: it was removed, or never asked for; ask for it again",
+                        export=job_id,
+                    )
+                )
             return self._jobs[job_id]
 
     def file(self, job_id: str) -> Path:
@@ -111,7 +126,9 @@ class Exports:
         """
         job = self.job(job_id)
         if job.state is not ExportState.DONE:
-            raise StateForbidsError(f"export {job_id} is {job.state.value}: wait until it is done")
+            raise StateForbidsError(
+                phrase("export_not_done", "export {export} is not done: wait until it is", export=job_id)
+            )
         return self._place(job)
 
     def remove(self, job_id: str) -> ExportJob:
@@ -175,9 +192,14 @@ class Exports:
                 hold=lambda held: self._change(job.id, state=ExportState.PAUSED if held else ExportState.RUNNING),
             )
             if end is not None:
-                self._end(job.id, **({"problem": end["problem"]["text"]} if "problem" in end else end))
+                self._end(job.id, **({"problem": from_plain(end["problem"])} if "problem" in end else end))
         except OSError as error:
-            self._end(job.id, problem=f"the export cannot be made ({error.strerror}): try again")
+            self._end(
+                job.id,
+                problem=phrase(
+                    "export_failed", "the export cannot be made ({why}): try again", why=error.strerror or str(error)
+                ),
+            )
         if job.id not in self._jobs:
             shutil.rmtree(place.parent, ignore_errors=True)
 

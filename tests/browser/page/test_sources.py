@@ -207,6 +207,7 @@ def test_findings_events_and_reasons_are_said_in_norwegian_too_with_the_values_t
             "nb-refusals.js",
             "nb-digitizing.js",
             "nb-targets.js",
+            "nb-files.js",
         )
     ]
     assert set().union(*listed) == heard

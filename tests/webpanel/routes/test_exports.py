@@ -53,7 +53,7 @@ def _asked(client: httpx.Client, **order: Any) -> dict[str, Any]:
 
 def test_a_video_without_loss_is_made_and_fetched(client: httpx.Client, log: Path, tmp_path: Path) -> None:
     job = _until(client, _asked(client, kind="ffv1"), "done", "failed")
-    assert (job["problem"], job["done"], job["pulses"]) == ("", PULSES, PULSES)
+    assert (job["problem"], job["done"], job["pulses"]) == (None, PULSES, PULSES)
     answer = client.get(f"/api/exports/{job['id']}/file")
     assert len(answer.content) == job["bytes"]
     assert answer.headers["content-disposition"].startswith('attachment; filename="17_Ase_jump.mkv"')
@@ -106,10 +106,10 @@ def test_a_running_export_stands_still_for_a_recording_and_can_be_given_up(tmp_p
 
 def test_what_fails_says_why_and_the_next_goes_on(client: httpx.Client) -> None:
     bad, good = _asked(client, cameras=["K9"]), _asked(client, kind="csv")
-    assert "has no camera K9; choose among K1, K2, K3" in _until(client, bad, "done", "failed")["problem"]
+    assert "has no camera K9; choose among K1, K2, K3" in _until(client, bad, "done", "failed")["problem"]["text"]
     assert _until(client, good, "done", "failed")["state"] == "done"
     turned = _until(client, _asked(client, first=5, last=4), "done", "failed")
-    assert turned["problem"].endswith("jump.mcap: first pulse 5, last pulse 4: that is none; exchange them")
+    assert turned["problem"]["text"].endswith("jump.mcap: first pulse 5, last pulse 4: that is none; exchange them")
     assert refused(client.post(ASK, json={"slow": 11}), 422).code == "invalid_request"
     assert refused(client.post("/api/recordings/nobody/exports", json={}), 404).code == "unknown_recording"
 

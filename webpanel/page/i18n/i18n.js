@@ -5,6 +5,7 @@ import { en } from "./en.js";
 import { analysis as nbAnalysis } from "./nb-analysis.js";
 import { digitizing as nbDigitizing } from "./nb-digitizing.js";
 import { events as nbEvents } from "./nb-events.js";
+import { files as nbFiles } from "./nb-files.js";
 import { findings as nbFindings } from "./nb-findings.js";
 import { refusals as nbRefusals } from "./nb-refusals.js";
 import { statements as nbStatements } from "./nb-statements.js";
@@ -16,7 +17,7 @@ import { nb } from "./nb.js";
 
 const LANGUAGES = { en, nb };
 /** @type {Record<string, Record<string, [string, string?]>>} text and advice by code */
-const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis, ...nbRefusals, ...nbDigitizing, ...nbTargets } };
+const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis, ...nbRefusals, ...nbDigitizing, ...nbTargets, ...nbFiles } };
 
 /** @type {"en"|"nb"} */
 let language = "en";

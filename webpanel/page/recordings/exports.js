@@ -1,6 +1,6 @@
 /** Exports of the recording shown: ask for a video, pictures or a table, see how far it is, fetch it. */
 
-import { t } from "../i18n/i18n.js";
+import { say, t } from "../i18n/i18n.js";
 import { call, recordingPath } from "../shared/api.js";
 import { $, icon, make } from "../shared/dom.js";
 import { number, size } from "../shared/format.js";
@@ -8,7 +8,7 @@ import { place } from "../shared/router.js";
 import { attempt } from "../shared/snacks.js";
 import { beginMarking, mark, marked, startMarking } from "../viewing/marking.js";
 
-/** @typedef {{ id: string, recording: string, state: string, done: number, pulses: number, name: string, bytes: number, problem: string }} ExportJob */
+/** @typedef {{ id: string, recording: string, state: string, done: number, pulses: number, name: string, bytes: number, problem: import("../shared/types.js").Phrase|null }} ExportJob */
 
 const KINDS = ["h264", "ffv1", "png", "tiff", "csv", "contact_sheet"];
 const SLOW = [1, 2, 3, 5, 10];
@@ -112,7 +112,7 @@ function drawJobs() {
 /** @param {ExportJob} job */
 function words({ state, done, pulses, bytes, problem }) {
   if (state === "done") return size(bytes);
-  if (state === "failed") return problem;
+  if (state === "failed") return problem ? say(problem).text : "";
   const part = pulses ? ` ${number((100 * done) / pulses)} %` : "";
   return t(`export.${state}`) + part;
 }

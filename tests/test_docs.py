@@ -147,7 +147,7 @@ def test_the_survey_of_the_page_on_measuring_fits_the_simulated_hill(tmp_path: P
     scene = orient_images(training_images(), read_survey(path), training_detections())
     for camera in training().cameras:
         assert np.allclose(scene.cameras[camera.name].position, camera.X0, atol=0.2), camera.name
-    assert "15 of 15 surveyed balls in sight named" in scene.messages[0]
+    assert "15 of 15 surveyed balls in sight named" in str(scene.messages[0])
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from photogrammetry.network.file import pixel_to_metric
 from photogrammetry.network.model import Image, ImageFrame, ImageObservations, Network, Point, Role
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 
 _ALIKE = 0.005  # of the image's width: balls displaced alike differ by less, also where the camera rolled a little
 _CHANCE = 1e-3  # that balls agree although they are others
@@ -65,7 +65,8 @@ def scene_of_calibration(
     for name in system.names:
         places = _places(system[name], calibration)
         if len(places) < FEWEST:
-            notes.append(f"camera {name}: {calibration.source} holds too few image points of balls to compare it with")
+            text = "camera {camera}: {source} holds too few image points of balls to compare it with"
+            notes.append(phrase("poses_few_points", text, camera=name, source=calibration.source))
             continue
         found[name] = detections[name] if detections else detect_balls(static[name])
         match = _matched(system[name], places, calibration, found[name])
@@ -73,7 +74,9 @@ def scene_of_calibration(
             elsewhere.append(name)
         else:
             matches[name] = match
-            notes.append(f"camera {name}: {len(match.change.used)} of {len(places)} balls of the calibration found")
+            text = "camera {camera}: {found} of {balls} balls of the calibration found"
+            used_balls = len(match.change.used)
+            notes.append(phrase("poses_balls_found", text, camera=name, found=used_balls, balls=len(places)))
     matches, light = _in_one_light(system, matches, calibration, static, found)
     used = tuple(name for name in system.names if name not in elsewhere)
     notes += [*light, *_verdict(calibration, used, elsewhere), *_moved_balls(matches)]
@@ -84,7 +87,7 @@ def scene_of_calibration(
     return OrientedScene(chosen, balls, network, static, changes, (*calibration.messages, *notes))
 
 
-def _verdict(calibration: Calibration, used: Sequence[str], elsewhere: Sequence[str]) -> list[str]:
+def _verdict(calibration: Calibration, used: Sequence[str], elsewhere: Sequence[str]) -> list[Phrase]:
     """What there is to say of cameras whose balls are elsewhere.
 
     Raises:
@@ -117,18 +120,20 @@ def _verdict(calibration: Calibration, used: Sequence[str], elsewhere: Sequence[
                 cameras=" and ".join(elsewhere),
             )
         )
-    return [
-        f"camera {name} is left out: its balls are not where {calibration.source} has them, so it was turned far, or "
-        "its balls are covered; orient the log with --survey"
-        for name in elsewhere
-    ]
+    text = (
+        "camera {camera} is left out: its balls are not where {source} has them, so it was turned far, or its balls "
+        "are "
+        "covered; orient the log with --survey"
+    )
+    return [phrase("poses_left_out", text, camera=name, source=calibration.source) for name in elsewhere]
 
 
-def _moved_balls(matches: Mapping[str, _Match]) -> list[str]:
+def _moved_balls(matches: Mapping[str, _Match]) -> list[Phrase]:
     """Balls that several cameras show elsewhere than the calibration, when what the cameras moved is accounted for."""
     gone = [ball for match in matches.values() for ball in match.change.left_out]
+    text = "ball {ball} is not where the calibration has it (cameras {cameras}); it was moved, survey it again"
     return [
-        f"ball {ball} is not where the calibration has it (cameras {', '.join(where)}); it was moved, survey it again"
+        phrase("poses_ball_moved", text, ball=ball, cameras=", ".join(where))
         for ball in dict.fromkeys(gone)
         if len(where := [name for name, match in matches.items() if ball in match.change.left_out]) > 1
     ]
@@ -176,7 +181,7 @@ def _in_one_light(
     calibration: Calibration,
     static: Mapping[str, StaticImage],
     found: Mapping[str, Detections],
-) -> tuple[dict[str, _Match], list[str]]:
+) -> tuple[dict[str, _Match], list[Phrase]]:
     """Balls measured as lit spheres, as those of the calibration were, without those that moved; words on the light."""
     names = list(matches)
     rows = [(k, ball, place) for k, name in enumerate(names) for ball, place in matches[name].seen.items()]

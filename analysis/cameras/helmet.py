@@ -20,6 +20,7 @@ from photogrammetry.network.model import ImageObservations, Network, Point, Role
 from photogrammetry.procedures.orientation import Orientation, orient
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import phrase, plain
 
 HELMET = "P1"
 _MOVING = "H*"  # names of the helmet's places
@@ -53,8 +54,9 @@ def with_helmet(
         )
     network = _joined(scene.network, places)
     orientation = orient(network, alternative=2, moving=_MOVING, uncertain_interior=True)
-    notes = [f"{len(places)} places of the helmet tie the images beside the balls"]
-    found = [finding.message for stage in orientation.stages for finding in stage.findings]
+    text = "{count} places of the helmet tie the images beside the balls"
+    notes = [phrase("scene_helmet", text, count=len(places))]
+    found = [plain(finding.message) for stage in orientation.stages for finding in stage.findings]
     notes += [message for message in found if message not in scene.messages]
     again = scene_of_survey(scene_of(network, orientation, scene.static, {}, (*scene.messages, *notes)), scene.given)
     return replace(again, balls={n: ball for n, ball in again.balls.items() if n in scene.balls}), orientation

@@ -15,6 +15,7 @@ from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.model import Network
 from photogrammetry.reports.result_file import POSE
 from rig.arrays import Floats
+from rig.phrase import Phrase
 
 _DIGITS = 16  # of the hash that identifies a calibration
 
@@ -30,7 +31,7 @@ class OrientedScene:
         static: the static images.
         changes: by camera, the change of its pose from `system` to the static image. Empty if the poses were
             estimated from the static images themselves.
-        messages: what a person should know, one line each.
+        messages: what a person should know.
         given: identifies survey and interior orientation that the cameras were oriented with; empty if not known.
     """
 
@@ -39,7 +40,7 @@ class OrientedScene:
     network: Network
     static: Mapping[str, StaticImage]
     changes: Mapping[str, PoseChange]
-    messages: tuple[str, ...]
+    messages: tuple[Phrase, ...]
     given: str = ""
 
 
@@ -50,7 +51,7 @@ def scene_of_survey(scene: Scene, given: str = "") -> OrientedScene:
 
 
 def orientation_result(
-    scene: OrientedScene, moved: Sequence[CameraMove] = (), messages: Sequence[str] = ()
+    scene: OrientedScene, moved: Sequence[CameraMove] = (), messages: Sequence[Phrase] = ()
 ) -> OrientationResult:
     """What the result of a recording says about its cameras.
 
@@ -69,7 +70,7 @@ def orientation_result(
         images,
         balls,
         tuple(moved),
-        (*scene.messages, *messages),
+        tuple(message.text for message in (*scene.messages, *messages)),
         parameter_names(system),
         system.covariance,
         calibration_id(system),

@@ -23,7 +23,7 @@ from photogrammetry.procedures.calibrated_cameras import read_calibration
 from photogrammetry.reports.result_file import POSE
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.strict_toml import validate
 
 _NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
@@ -57,7 +57,7 @@ class Calibration:
         system: the cameras with their joint covariance; a camera's size is None where the file does not say it.
         balls: by name.
         length_unit: of the object system.
-        messages: what a person should know, one line each.
+        messages: what a person should know.
         ball_radius_m: of the balls; None if it is not known.
     """
 
@@ -65,10 +65,10 @@ class Calibration:
     system: CameraSystem
     balls: Mapping[str, KnownBall]
     length_unit: str
-    messages: tuple[str, ...]
+    messages: tuple[Phrase, ...]
     ball_radius_m: float | None = None
 
-    def of_images(self, sizes: Mapping[str, tuple[int, int]]) -> tuple[CameraSystem, list[str]]:
+    def of_images(self, sizes: Mapping[str, tuple[int, int]]) -> tuple[CameraSystem, list[Phrase]]:
         """The cameras of a log, in its order, and what there is to say.
 
         Args:
@@ -77,7 +77,8 @@ class Calibration:
         Raises:
             BadInputError: a camera is missing, or was oriented with images of another size.
         """
-        placed, notes = {}, []
+        placed: dict[str, PlacedCamera] = {}
+        notes: list[Phrase] = []
         for name, size in sizes.items():
             if name not in self.system.cameras:
                 there = ", ".join(self.system.names)
@@ -93,7 +94,8 @@ class Calibration:
                 )
             known = self.system[name].camera.size
             if known is None:
-                notes.append(f"{self.source} does not say the image size of camera {name}; taken as that of the log")
+                text = "{source} does not say the image size of camera {camera}; taken as that of the log"
+                notes.append(phrase("poses_size_taken", text, source=self.source, camera=name))
             elif known != size:
                 raise BadInputError(
                     phrase(
@@ -107,7 +109,11 @@ class Calibration:
                     )
                 )
             placed[name] = replace(self.system[name], camera=replace(self.system[name].camera, size=size))
-        notes += [f"camera {n} of the calibration has no image in the log" for n in self.system.names if n not in sizes]
+        notes += [
+            phrase("poses_no_image", "camera {camera} of the calibration has no image in the log", camera=name)
+            for name in self.system.names
+            if name not in sizes
+        ]
         return CameraSystem(placed, self.system.covariance).only(tuple(placed)), notes
 
 
@@ -262,15 +268,15 @@ def _require_one_image_each(images: Mapping[str, _Image], cameras: Mapping[str, 
 
 def _covariance(
     joint: _Joint | None, images: Mapping[str, _Image], sigmas: Sequence[Mapping[str, float]], path: Path
-) -> tuple[Floats, list[str]]:
+) -> tuple[Floats, list[Phrase]]:
     """The joint covariance of all cameras; from their sigmas alone where the file has no other."""
     wanted = [(image, name) for image, named in zip(images, sigmas, strict=True) for name in named]
     if joint is None:
         variance = [sigma**2 for named in sigmas for sigma in named.values()]
-        line = (
-            f"{path} holds no joint covariance, so that the poses' correlations are missing in all sigmas; orient again"
+        text = (
+            "{path} holds no joint covariance, so that the poses' correlations are missing in all sigmas; orient again"
         )
-        return np.diag(variance), [line]
+        return np.diag(variance), [phrase("poses_no_joint", text, path=str(path))]
     image_of = {image.camera: name for name, image in images.items()}
     there = {
         (p.image if p.image is not None else image_of.get(p.camera or "", ""), p.parameter): i

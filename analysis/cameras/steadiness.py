@@ -21,6 +21,7 @@ from analysis.result.model import CameraMove
 from analysis.scene.camera_system import CameraSystem
 from photogrammetry.geometry.rotation import rotation_from_vector, vector_from_rotation
 from rig.arrays import Floats
+from rig.phrase import Phrase, phrase
 from rig.pulse import PulseNumber
 
 _BLOCKS = 16  # in which a recording is looked at
@@ -40,12 +41,12 @@ class Steadiness:
 
     Attributes:
         moved: cameras that moved since the calibration or during the recording, in order of the cameras.
-        messages: what else a person should know, one line each.
+        messages: what else a person should know.
         still: of cameras that were knocked during the recording, the pulses of the longest time without a knock.
     """
 
     moved: tuple[CameraMove, ...]
-    messages: tuple[str, ...]
+    messages: tuple[Phrase, ...]
     still: Mapping[str, range]
     _scene: OrientedScene
     _tracks: "_Tracks"
@@ -95,7 +96,7 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
     followed = _Tracks(trackers, source)
     tracks = followed.during({pulse for block in blocks for pulse in block})
     moved: list[CameraMove] = []
-    messages = []
+    messages: list[Phrase] = []
     still: dict[str, range] = {}
     for name, turns in tracks.items():
         moved += _since_calibration(name, scene.changes.get(name), turns, len(blocks), len(tracks))
@@ -105,10 +106,12 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
             still[name] = _longest_still(found, source.pulses)
         frames = sum(len(block) for block in blocks)
         if len(turns) < frames / 2:
-            messages.append(
-                f"camera {name}: its balls were found in {len(turns)} of {frames} frames that were looked at, so "
-                "whether it stood still is not known for all of the recording"
+            text = (
+                "camera {camera}: its balls were found in {found} of {frames} frames that were looked at, so whether "
+                "it "
+                "stood still is not known for all of the recording"
             )
+            messages.append(phrase("steady_unknown", text, camera=name, found=len(turns), frames=frames))
     return Steadiness(tuple(moved), tuple(messages), still, scene, followed, static)
 
 

@@ -23,7 +23,7 @@ from analysis.scene.camera_system import CameraSystem
 from analysis.scene.static_image import StaticImage, static_images
 from photogrammetry.procedures.orientation import Orientation
 from rig.errors import NoJumpError
-from rig.phrase import phrase
+from rig.phrase import phrase, plain
 
 _NAMED = 6  # pulses that a message names, at most
 #: Told with the step that is done, in words, and the share of it that is done, 0 to 1.
@@ -151,7 +151,7 @@ def analyze(
         facts.recording,
         facts.session,
         facts.rate_hz,
-        orientation_result(scene, steadiness.moved, (*facts.messages, *unread, *steadiness.messages)),
+        orientation_result(scene, steadiness.moved, (*map(plain, (*facts.messages, *unread)), *steadiness.messages)),
         _synchrony(computed),
         tuple(each.jump for each in computed),
     )

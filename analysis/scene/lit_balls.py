@@ -21,6 +21,7 @@ from photogrammetry.network.file_writer import metric_to_pixel
 from photogrammetry.network.model import Network
 from photogrammetry.procedures.orientation import Orientation
 from rig.arrays import Flags, Floats, Integers
+from rig.phrase import Phrase, phrase
 
 SMALL: Final = 0.9  #: of the radius: discs that look smaller than that are lit from the side
 _EXPLAINED = 0.7  # of the variance around the background
@@ -50,34 +51,38 @@ class MeasuredBalls:
     radius: float
     estimated: bool
 
-    def messages(self, camera: Integers, cameras: Sequence[str], balls: Sequence[str]) -> list[str]:
-        """What a person should know of the light, one line each.
+    def messages(self, camera: Integers, cameras: Sequence[str], balls: Sequence[str]) -> list[Phrase]:
+        """What a person should know of the light.
 
         Args:
             camera: (n,) index of the camera of each.
             cameras: names of the cameras.
             balls: n names.
         """
-        said, aside = [], False
+        said: list[Phrase] = []
+        aside = False
         for k, name in enumerate(cameras):
             of = camera == k
             usual = float(np.median(self.share[of])) if of.any() else 1.0
             if usual < SMALL:
                 aside = True
-                said.append(
-                    f"camera {name}: light comes from the side: the balls look {usual:.2f} times as large as they are; "
+                text = (
+                    "camera {camera}: light comes from the side: the balls look {share:.2f} times as large as they "
+                    "are; "
                     "their centres are measured with this light"
                 )
+                said.append(phrase("scene_light_aside", text, camera=name, share=usual))
             if hidden := [balls[i] for i in np.flatnonzero(of & ~self.whole).tolist()]:
-                said.append(
-                    f"camera {name}: not seen as whole balls in the light of the others, so they count little: "
-                    f"{', '.join(hidden)}"
+                text = (
+                    "camera {camera}: not seen as whole balls in the light of the others, so they count little: {balls}"
                 )
+                said.append(phrase("scene_balls_covered", text, camera=name, balls=", ".join(hidden)))
         if self.estimated and aside:
-            said.append(
-                f"the radius of the balls is not given; {self.radius:.3f} m fits the images best; measure it and give "
-                'it as "ball_radius_m" in the survey: a wrong radius moves all balls of an image alike'
+            text = (
+                "the radius of the balls is not given; {radius:.3f} m fits the images best; measure it and give it as "
+                '"ball_radius_m" in the survey: a wrong radius moves all balls of an image alike'
             )
+            said.append(phrase("scene_radius", text, radius=self.radius))
         return said
 
 
@@ -87,11 +92,11 @@ class LitNetwork:
 
     Attributes:
         network: with these centres, and with the radius of the balls.
-        messages: what a person should know, one line each.
+        messages: what a person should know.
     """
 
     network: Network
-    messages: tuple[str, ...]
+    messages: tuple[Phrase, ...]
 
 
 def measure_balls(

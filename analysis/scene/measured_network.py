@@ -12,6 +12,7 @@ from analysis.scene.naming import Naming, Spots
 from analysis.scene.survey import KnownPoints, Survey
 from analysis.scene.ties import Tie
 from photogrammetry.network.model import Camera, Image, ImageObservations, Network, Point, Role
+from rig.phrase import Phrase, phrase
 
 _SURVEY_OFF = 0.04  # of the survey's extent: a ball without a name may be a surveyed point so far from it
 
@@ -39,7 +40,7 @@ _Seen = dict[tuple[str, str], int]
 
 def measured_network(
     views: Mapping[str, View], namings: Mapping[str, Naming], ties: Sequence[Tie], survey: Survey, known: KnownPoints
-) -> tuple[Network, list[str]]:
+) -> tuple[Network, list[Phrase]]:
     """The network of everything that was measured.
 
     Args:
@@ -50,7 +51,7 @@ def measured_network(
         known: the surveyed balls, as `namings` counts them.
 
     Returns:
-        The network, with poses where the survey gives approximate ones, and what there is to say, one line each.
+        The network, with poses where the survey gives approximate ones, and what there is to say.
     """
     given = {point.name: point for point in survey.network.points}
     points: dict[str, Point] = {}
@@ -111,7 +112,7 @@ def _image(index: int, view: View, naming: Naming, survey: Survey) -> Image:
 
 def _nearest_points(
     ties: Sequence[Tie], points: Sequence[Point], known: KnownPoints, unit: str
-) -> tuple[dict[int, Point], list[str]]:
+) -> tuple[dict[int, Point], list[Phrase]]:
     """Which ties are points of the survey whose coordinates are approximate or wrong; surveyed ones are reported."""
     if not points or not ties:
         return {}, []
@@ -120,17 +121,18 @@ def _nearest_points(
     off = np.array([tie.xyz for tie in ties], float)[:, None] - there
     distance = np.linalg.norm(off, axis=2)
     chosen: dict[int, Point] = {}
-    notes = []
+    notes: list[Phrase] = []
     for i, j in enumerate(distance.argmin(axis=1)):
         if distance[i, j] > limit or distance[:, j].argmin() != i:
             continue
         chosen[i] = points[int(j)]
         if chosen[i].role not in {Role.TIE, Role.CHECK}:
             words = ", ".join(f"{value:+.3f}" for value in off[i, j])
-            notes.append(
-                f"the images show a ball at {chosen[i].name} + ({words}) {unit} and none at its surveyed coordinates; "
-                "survey it again"
+            text = (
+                "the images show a ball at {ball} + ({off}) {unit} and none at its surveyed coordinates; survey it "
+                "again"
             )
+            notes.append(phrase("scene_ball_beside", text, ball=chosen[i].name, off=words, unit=unit))
     return chosen, notes
 
 
@@ -147,11 +149,21 @@ def _counts(
     seen: _Seen,
     points: Mapping[str, Point],
     known: KnownPoints,
-) -> list[str]:
+) -> list[Phrase]:
     notes = [
-        f"camera {name}: {len(naming.points)} of {naming.expected} surveyed balls in sight named, "
-        f"{sum(camera == name for camera, _ in seen)} balls measured, {len(views[name].spots)} round spots found"
+        phrase(
+            "scene_counts",
+            "camera {camera}: {named} of {expected} surveyed balls in sight named, {measured} balls measured, {spots} "
+            "round spots found",
+            camera=name,
+            named=len(naming.points),
+            expected=naming.expected,
+            measured=sum(camera == name for camera, _ in seen),
+            spots=len(views[name].spots),
+        )
         for name, naming in namings.items()
     ]
-    lost = [ball for ball in known.names if ball not in points]
-    return notes + ([f"surveyed balls found in no image: {', '.join(lost)}"] if lost else [])
+    lost = ", ".join(ball for ball in known.names if ball not in points)
+    return (
+        [*notes, phrase("scene_balls_lost", "surveyed balls found in no image: {balls}", balls=lost)] if lost else notes
+    )

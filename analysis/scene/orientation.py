@@ -26,7 +26,7 @@ from photogrammetry.network.model import Camera, Image, Network, Role
 from photogrammetry.procedures.orientation import Orientation, orient
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.phrase import Phrase, phrase
+from rig.phrase import Phrase, phrase, plain
 from rig.phrases import in_turn
 
 _FEWEST_CAMERAS = 2
@@ -84,7 +84,7 @@ class Scene:
         orientation: the adjustment with its three stages; holds the joint covariance of all poses.
         static: the static images.
         failures: cameras that could not be oriented, and why.
-        messages: what a person should know, one line each.
+        messages: what a person should know.
     """
 
     cameras: Mapping[str, OrientedCamera]
@@ -93,7 +93,7 @@ class Scene:
     orientation: Orientation
     static: Mapping[str, StaticImage]
     failures: Mapping[str, Phrase]
-    messages: tuple[str, ...]
+    messages: tuple[Phrase, ...]
 
 
 def orient_log(log: Path, survey: Survey, pulses: range | None = None) -> Scene:
@@ -163,11 +163,17 @@ def orient_images(
     if len(orientation.outcome.adjustment.network.images) < _FEWEST_CAMERAS:
         raise BadInputError("; ".join(orientation.left_out))
     failures = strange | failures
-    messages = [f"camera {name} is not oriented: {reason}" for name, reason in failures.items()]
+    messages = [
+        phrase("scene_not_oriented", "camera {camera} is not oriented: {why}", camera=name, why=reason)
+        for name, reason in failures.items()
+    ]
     missing = [camera.name for camera in survey.network.cameras if camera.name not in static]
-    messages += [f"camera {name} of the survey has no image in the log" for name in missing]
-    messages += [*notes, *orientation.left_out, *_misfit(orientation), *lit.messages]
-    messages += [finding.message for stage in orientation.stages for finding in stage.findings]
+    messages += [
+        phrase("scene_no_image", "camera {camera} of the survey has no image in the log", camera=name)
+        for name in missing
+    ]
+    messages += [*notes, *map(plain, orientation.left_out), *_misfit(orientation), *lit.messages]
+    messages += [plain(finding.message) for stage in orientation.stages for finding in stage.findings]
     return scene_of(network, orientation, static, failures, messages)
 
 
@@ -262,8 +268,8 @@ def _ties(views: Mapping[str, View], namings: Mapping[str, Naming], known: Known
     return find_ties(stations, size)
 
 
-def _misfit(orientation: Orientation) -> list[str]:
-    """A line if the residuals are larger than their sigmas explain, which gross errors of single balls do not do."""
+def _misfit(orientation: Orientation) -> list[Phrase]:
+    """What to say if residuals are larger than their sigmas explain, which gross errors of single balls do not do."""
     a = orientation.outcome.adjustment
     if a.redundancy < 1 or a.ratio**2 * a.redundancy < chdtri(a.redundancy, _MISFIT_RISK):
         return []
@@ -271,11 +277,11 @@ def _misfit(orientation: Orientation) -> list[str]:
     squares = (a.image_residuals() / o.sigma) ** 2
     rms = {image.name: float(np.sqrt(squares[o.image == i].mean())) for i, image in enumerate(a.network.images)}
     words = ", ".join(f"{name} {value:.1f}" for name, value in rms.items())
-    line = (
-        f"the residuals are {a.ratio:.1f} times as large as their sigmas say (image points, by camera: {words}); the "
+    text = (
+        "the residuals are {ratio:.1f} times as large as their sigmas say (image points, by camera: {cameras}); the "
         "sigmas of the result are larger by as much; check the interior orientations and the sigmas of the survey"
     )
-    return [line]
+    return [phrase("scene_misfit", text, ratio=a.ratio, cameras=words)]
 
 
 def scene_of(
@@ -283,7 +289,7 @@ def scene_of(
     orientation: Orientation,
     static: Mapping[str, StaticImage],
     failures: Mapping[str, Phrase],
-    messages: Sequence[str],
+    messages: Sequence[Phrase],
 ) -> Scene:
     """The scene of an oriented network with one image of each camera."""
     a = orientation.outcome.adjustment

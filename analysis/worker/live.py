@@ -40,7 +40,7 @@ from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.events import Level
 from rig.images.picture import Grey, measurable
-from rig.phrase import Phrase, phrase, plain
+from rig.phrase import Phrase, phrase
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
@@ -161,7 +161,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
         self._finder, self._watch = Finder({name: static[name] for name in scene.system.names}), LiveWatch(self._scene)
         self._watch.begin(recording.waiting_frames(_BEGUN))
         self._findings.oriented(recording.id, (recording.last or recording.first).time, self._scene)
-        said = (*map(plain, scene.messages), *(move.said for move in moved))
+        said = (*scene.messages, *(move.said for move in moved))
         if said != self._said:
             self._said = said
             for each in said:

@@ -27,7 +27,7 @@ def _orient(order: "OrientingOrder", _: Path, tell: Teller) -> "OrientedCameras"
         except SvevError as error:
             text = "{why}; or click four or more balls in each image, and orient by them"
             raise BadInputError(phrase("hand_or_click", text, why=error.said)) from None
-        findings = [*map(plain, found.scene.messages), *(move.said for move in found.steadiness.moved)]
+        findings = [*found.scene.messages, *(move.said for move in found.steadiness.moved)]
         return OrientedCameras(found.scene.system, tuple(findings), by_clicks=False)
     sizes = {name: camera.size for name, camera in log_facts(order.log).cameras.items()}
     system, notes = orient_by_clicks(sizes, order.source, order.marks)

@@ -59,7 +59,7 @@ def test_the_helmet_ties_the_images() -> None:
         places = sum(point.name.startswith("H") for point in better.network.points)
         assert places > 20
         assert orientation.notes[0] == f"alternative 2: {places} moving points tie the images beside the static ones"
-        assert better.messages[0] == f"{places} places of the helmet tie the images beside the balls"
+        assert str(better.messages[0]) == f"{places} places of the helmet tie the images beside the balls"
         assert set(better.balls) == set(scene.balls)
         ratios.append(np.sqrt(np.diagonal(better.system.covariance) / np.diagonal(scene.system.covariance)))
         squares.append(_normalized(better) ** 2)

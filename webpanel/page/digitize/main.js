@@ -1,4 +1,9 @@
-/** Puts the page of measuring by hand together: `digitize.html?recording=ID`. */
+/**
+ * Puts the page of measuring by hand together: `digitize.html?recording=ID`.
+ *
+ * Its rooms, each of which sees those before it: `session` (what is known and kept, by whom), `marking` (how a click becomes
+ * a mark, and what it means), `views` (the pictures and what is drawn over them), `cards` (what stands beside them).
+ */
 
 import { startLogin } from "../frame/login.js";
 import { say, startLanguage, t } from "../i18n/i18n.js";

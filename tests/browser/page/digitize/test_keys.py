@@ -1,5 +1,6 @@
 """A jump measured with keys alone: points placed and moved in all views, followed through the pulses, and computed."""
 
+import math
 import re
 
 import numpy as np
@@ -9,7 +10,7 @@ from playwright.sync_api import Page, expect
 from rig.arrays import Floats
 from tests.analysis.simulated import SIZE
 from tests.browser.conftest import Open
-from tests.browser.page.digitize.conftest import PULSE, Desk, canvas_of, enter
+from tests.browser.page.digitize.conftest import PULSE, Desk, canvas_of, enter, settled
 from tests.support.waiting import wait_until
 
 #: Steps of the crosshair, CSS px, and of a mark, px of the image.
@@ -34,6 +35,7 @@ def _walk(page: Page, way: Floats, keys: tuple[str, str, str, str], steps: tuple
 
 
 def _crosshair(page: Page) -> Floats:
+    settled(page)
     words = page.locator("#cursor-where").inner_text()
     return np.array([float(number) for number in re.findall(r"-?\d+\.\d+", words)])
 
@@ -44,36 +46,71 @@ def _off(desk: Desk, camera: str, thing: str) -> float:
     return np.inf if mark is None else float(np.abs(np.array(mark["xy"]) - desk.true(camera, thing)).max())
 
 
+def _choose(page: Page, camera: str, thing: str) -> None:
+    """Go to a thing in a view of the pulse that is measured; placing goes on to the next one by itself."""
+    pulse = page.locator("#pulse-number")
+    while pulse.inner_text() != str(PULSE):
+        page.keyboard.press("q")
+    while "active" not in (page.locator(f'.pane[data-camera="{camera}"]').get_attribute("class") or "").split():
+        page.keyboard.press("d")
+        settled(page)
+    while page.locator(f'[data-thing="{thing}"]').get_attribute("aria-pressed") != "true":
+        page.keyboard.press("s")
+        settled(page)
+
+
+def _place(page: Page, camera: str, thing: str, true: Floats) -> None:
+    """Place a thing by the crosshair, and nudge it to where it really is."""
+    _choose(page, camera, thing)
+    if not page.locator("#cursor-where").inner_text().startswith(camera):
+        page.keyboard.press("Enter")
+        expect(page.locator("#cursor-where")).to_contain_text(camera)
+    box = canvas_of(page, camera)
+    scale = min(box["width"] / SIZE[0], box["height"] / SIZE[1])
+    _walk(page, (true - _crosshair(page)) * scale, ("j", "l", "i", "k"), STEPS)
+    placed = _crosshair(page)
+    page.keyboard.press("Enter")
+    settled(page)
+    _choose(page, camera, thing)
+    _walk(page, true - placed, ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"), NUDGES)
+
+
 @pytest.mark.long
 def test_a_jump_is_measured_by_keys(desk: Desk, open_page: Open) -> None:
     page = enter(open_page, desk, width=1280, height=800, reduced_motion="reduce")
     for camera in ("K1", "K2", "K3"):
-        expect(page.locator(f'.pane[data-camera="{camera}"]')).to_have_class(re.compile("active"))
+        for side, ski in desk.log.truth[PULSE]["skis"].items():
+            for along in (-0.9, 0.9):
+                true = desk.image(camera, np.array(ski["point"]) + along * np.array(ski["direction"]))
+                _place(page, camera, f"{side} ski", true)
         for thing in ("P1", "P2", "P3", "P4"):
-            while page.locator(f'[data-thing="{thing}"]').get_attribute("aria-pressed") != "true":
-                page.keyboard.press("s")
-            if thing == "P1":
-                page.keyboard.press("Enter")
-                expect(page.locator("#cursor-where")).to_contain_text(camera)
-            true = desk.true(camera, thing)
-            box = canvas_of(page, camera)
-            scale = min(box["width"] / SIZE[0], box["height"] / SIZE[1])
-            _walk(page, (true - _crosshair(page)) * scale, ("j", "l", "i", "k"), STEPS)
-            page.keyboard.press("Enter")
-            expect(page.locator(f'[data-thing="{thing}"]')).to_have_attribute("aria-pressed", "false")
-            _walk(page, true - _crosshair(page), ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"), NUDGES)
-        page.keyboard.press("d")
+            _place(page, camera, thing, desk.true(camera, thing))
     for camera in ("K1", "K2", "K3"):
         for thing in ("P1", "P2", "P3", "P4"):
             wait_until(lambda: _off(desk, camera, thing) < 0.1, f"{thing} is where it is to be in {camera}", 20)  # noqa: B023 - called at once
+    for ski in ("left ski", "right ski"):
+        _choose(page, "K1", ski)
+        page.keyboard.press("e")
+        expect(page.locator("#track-said li")).to_contain_text("it was refined", timeout=60_000)
+        expect(page.locator("#track-said li")).to_contain_text("Right" if ski == "right ski" else "Left")
+        marks = [desk.mark(camera, ski) for camera in ("K1", "K2", "K3")]
+        sources = [mark["vertices"][0]["source"] for mark in marks if mark is not None]
+        assert sources.count("refined") >= 2  # where an image shows it well
+    _choose(page, "K1", "P1")
     page.keyboard.press("2")
-    expect(page.locator("#track-said li")).to_have_count(4, timeout=60_000)
+    expect(page.locator("#track-share")).to_be_visible()
+    expect(page.locator("#track-said li")).to_have_count(6, timeout=90_000)
+    expect(page.locator("#track-share")).to_be_hidden()
     for pulse in (PULSE, PULSE + 2):
         truth = desk.log.truth[pulse]["points"]
         space = desk.view(pulse)["space"]
         for thing in ("P1", "P2", "P3", "P4"):
             off = np.array(space[thing]["X"]) - truth[thing]
             assert (np.abs(off) < 6 * np.array(space[thing]["sigma"])).all(), (pulse, thing)
+        lines = desk.view(pulse)["lines"]
+        for side, ski in desk.log.truth[pulse]["skis"].items():
+            slope, angle = lines[f"{side} ski"]["slope"], math.degrees(math.asin(ski["direction"][2]))
+            assert abs(slope["value"] - angle) < 6 * slope["sigma"], (pulse, side)
     page.locator("#compute").focus()
     page.keyboard.press("Enter")
     expect(page.locator("#result-state")).to_contain_text("Computed.", timeout=60_000)

@@ -147,7 +147,7 @@ class Errands(Generic[State]):
                 hold=lambda held: self._hear(who, {"paused": held}),
                 yielding=self._busy is not None,
             )
-            if end is None:
+            if end is None or not self.works(who):
                 return None
             if "problem" in end:
                 return self._failed(before, from_plain(end["problem"]))

@@ -122,8 +122,7 @@ def _verdict(calibration: Calibration, used: Sequence[str], elsewhere: Sequence[
         )
     text = (
         "camera {camera} is left out: its balls are not where {source} has them, so it was turned far, or its balls "
-        "are "
-        "covered; orient the log with --survey"
+        "are covered; orient the log with --survey"
     )
     return [phrase("poses_left_out", text, camera=name, source=calibration.source) for name in elsewhere]
 

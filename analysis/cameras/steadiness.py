@@ -108,8 +108,7 @@ def watch(scene: OrientedScene, source: FrameSource) -> Steadiness:
         if len(turns) < frames / 2:
             text = (
                 "camera {camera}: its balls were found in {found} of {frames} frames that were looked at, so whether "
-                "it "
-                "stood still is not known for all of the recording"
+                "it stood still is not known for all of the recording"
             )
             messages.append(phrase("steady_unknown", text, camera=name, found=len(turns), frames=frames))
     return Steadiness(tuple(moved), tuple(messages), still, scene, followed, static)

@@ -68,8 +68,7 @@ class MeasuredBalls:
                 aside = True
                 text = (
                     "camera {camera}: light comes from the side: the balls look {share:.2f} times as large as they "
-                    "are; "
-                    "their centres are measured with this light"
+                    "are; their centres are measured with this light"
                 )
                 said.append(phrase("scene_light_aside", text, camera=name, share=usual))
             if hidden := [balls[i] for i in np.flatnonzero(of & ~self.whole).tolist()]:

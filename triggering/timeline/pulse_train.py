@@ -63,6 +63,7 @@ class PulseTrain:
         self.tolerance_ns = min(max(_SPREAD_NS, self._least_ns), self.widest_ns)
         self._spreads: deque[int] = deque(maxlen=_RECENT)
         self._intervals: deque[int] = deque(maxlen=RHYTHM)
+        self._rhythm: tuple[float | None] | None = None  # computed from the intervals; None: they have changed since
         self._delivered = 0
         self._beat: HostNs | None = None  # the last pulse that was not the second half of one
         self._learn_in = _LEARN_EVERY
@@ -73,6 +74,11 @@ class PulseTrain:
 
         The mean of the recent intervals is nearer to it than `period_ns`, which follows slowly.
         """
+        if self._rhythm is None:
+            self._rhythm = (self._rhythm_of_intervals(),)
+        return self._rhythm[0]
+
+    def _rhythm_of_intervals(self) -> float | None:
         if len(self._intervals) < RHYTHM_LEAST:
             return None
         usual = median_low(self._intervals)
@@ -110,6 +116,7 @@ class PulseTrain:
             else:
                 interval = time - (self._beat or last)
                 self._intervals.append(interval)
+                self._rhythm = None
                 self._follow(interval)
                 self._beat = time
         self._delivered = delivered
@@ -135,6 +142,7 @@ class PulseTrain:
         if len(recent) == _CHANGE and max(recent) - min(recent) < AGREE * min(recent):
             if abs(min(recent) - self.period_ns) > AGREE * self.period_ns:
                 self._intervals = deque(recent, maxlen=RHYTHM)  # those before are of another rhythm
+                self._rhythm = None
             self._measured(sum(recent) / _CHANGE)
             return
         if self.steady and self.rhythm_ns is None:

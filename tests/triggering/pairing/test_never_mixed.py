@@ -50,7 +50,7 @@ class WatchedHill(Hill):
         self.most_open = 0
 
     def _check(self, closed: list[ClosedPulse]) -> None:
-        self.most_open = max(self.most_open, self._pairer.health().open)
+        self.most_open = max(self.most_open, len(self._pairer.open))
         for pulse in closed:
             self.closed.append(pulse)
             if not self.said and len(self.closed) % LOOK == 0:

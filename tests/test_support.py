@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import loopback as loopback_blocks
+from tests.support.leaks import used_elsewhere
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -164,6 +165,23 @@ def test_longest(): pass
 """
     collected = _pytest(tmp_path, source, "--collect-only", "-q", "-o", "timeout=180")
     assert re.findall(r"::(test_\w+)", collected) == ["test_longest", "test_long", "test_usual", "test_short"]
+
+
+def test_a_semaphore_of_another_program_is_no_leak() -> None:
+    program = """
+import multiprocessing, sys
+semaphore = multiprocessing.get_context("spawn").Semaphore()
+print(semaphore._semlock.name.removeprefix("/"), flush=True)
+sys.stdin.read()
+"""
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdin is not None
+        assert other.stdout is not None
+        path = Path("/dev/shm") / f"sem.{other.stdout.readline().strip()}"  # noqa: S108 - looked at, not written
+        assert path.exists()
+        assert used_elsewhere(path)
+        other.stdin.close()
 
 
 def test_two_runs_at_once_get_different_addresses(loopback: Loopback) -> None:

@@ -92,7 +92,7 @@ def _new_since(before: Snapshot, token: str, spare_events: int, *, all_kinds: bo
     others += [
         f"shared memory still there: {path}"
         for path in now.shared_memory - before.shared_memory
-        if not _used_elsewhere(path)
+        if not used_elsewhere(path)
     ]
     return Leaks(processes, tuple(sorted(others)))
 
@@ -107,14 +107,32 @@ def _native_threads() -> frozenset[tuple[int, str]]:
     return frozenset(found)
 
 
-def _used_elsewhere(path: Path) -> bool:
-    """Whether a process that is not ours has this piece of shared memory open: then it is not ours either."""
+def used_elsewhere(path: Path) -> bool:
+    """Whether a process that is not ours has this piece of shared memory open: then it is not ours either.
+
+    A semaphore is mapped under the name that it had while it was made, so the file is known by its number.
+    """
+    try:
+        file = path.stat()
+    except FileNotFoundError:
+        return True  # whoever has removed it just now used it
+    mapped = f" {os.major(file.st_dev):02x}:{os.minor(file.st_dev):02x} {file.st_ino} "
     for folder in Path("/proc").glob("[0-9]*"):
         if int(folder.name) == os.getpid():
             continue
         with suppress(OSError):
-            if str(path) in (folder / "maps").read_text():
+            if mapped in (folder / "maps").read_text():
                 return True
-            if any(link.readlink() == path for link in (folder / "fd").iterdir()):
-                return True
+        for link in _links(folder / "fd"):
+            with suppress(OSError):
+                opened = link.stat()
+                if (opened.st_dev, opened.st_ino) == (file.st_dev, file.st_ino):
+                    return True
     return False
+
+
+def _links(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError:  # the process has ended, or is not ours to look at
+        return []

@@ -19,6 +19,7 @@ from rig.errors import BadInputError
 _COLLINEAR = 1e-6  # height of a triangle over its longest side
 _TINY = 1e-12
 _TRIPLES = 5
+_EACH, _NEXT, _LAST = np.array([0, 1, 2]), np.array([1, 2, 0]), np.array([2, 0, 1])  # corners of a triangle
 _POLISH_STEPS = 20
 _REFINED = 3  # candidates that are refined
 _NEARLY_REAL = 0.2  # imaginary part of a root over its modulus: noise pushes double roots off the real axis
@@ -174,16 +175,15 @@ def _polished(distances: Floats, squares: Floats, cosines: Floats) -> Floats:
     """
     best, least = distances, np.inf
     for _ in range(_POLISH_STEPS):
-        one, other = np.roll(distances, -1), np.roll(distances, 1)
+        one, other = distances[_NEXT], distances[_LAST]
         errors = one**2 + other**2 - 2 * one * other * cosines - squares
         size = float(np.abs(errors / squares).max())
         if not size < least or np.any(distances <= 0.0):
             break
         best, least = distances, size
         jacobian = np.zeros((3, 3))
-        for k in range(3):
-            jacobian[k, (k + 1) % 3] = 2 * (one[k] - other[k] * cosines[k])
-            jacobian[k, (k + 2) % 3] = 2 * (other[k] - one[k] * cosines[k])
+        jacobian[_EACH, _NEXT] = 2 * (one - other * cosines)
+        jacobian[_EACH, _LAST] = 2 * (other - one * cosines)
         distances = distances - np.linalg.lstsq(jacobian, errors, rcond=None)[0]
     return best
 

@@ -165,15 +165,18 @@ def _point_part(problem: Problem, equations: Equations, end: int) -> tuple[Float
 def _add_relations(equations: Equations, n11: Floats, n22: Floats, gradient: Floats) -> None:
     """Add the relations; those between points only tie kept points."""
     split, relations = len(n11), equations.relations
-    for v, columns, values in zip(relations.v, relations.columns, relations.values, strict=True):
-        used = columns != NONE
-        where, slopes = columns[used], values[used]
-        gradient[where] += slopes * v
-        if len(where) and where[0] >= split:
-            block, axis = divmod(where - split, 3)
-            n22[block, axis, axis] += slopes * slopes
-        else:
-            n11[where[:, None], where] += slopes[:, None] * slopes
+    columns, values = relations.columns, relations.values
+    used = columns != NONE
+    np.add.at(gradient, columns[used], (values * relations.v[:, None])[used])
+    block, axis = np.divmod(columns[columns >= split] - split, 3)
+    np.add.at(n22, (block, axis, axis), values[columns >= split] ** 2)
+    tied = used & (columns < split)
+    of_kept = np.flatnonzero(tied.any(axis=1))
+    if not len(of_kept):
+        return
+    columns, values, tied = columns[of_kept], values[of_kept], tied[of_kept]
+    row, one, other = np.nonzero(tied[:, :, None] & tied[:, None, :])
+    np.add.at(n11, (columns[row, one], columns[row, other]), values[row, one] * values[row, other])
 
 
 def _scaled(n11: Floats, n12: Floats, n22: Floats, gradient: Floats) -> Normals:

@@ -121,7 +121,7 @@ def _verdict(a: Adjustment, camera: int, pictures: Sequence[Picture]) -> CameraV
 
 
 def _said(name: str, lens: float, one_to: float, *, good: bool) -> Phrase:
-    wanted, needed, known = round(WANTED), round(WANTED / _SHARE), round(_rounded(one_to))
+    wanted, needed, known = f"{WANTED:.0f}", round(WANTED / _SHARE), round(_rounded(one_to))
     lens_px = float(f"{lens:.2g}")
     if good:
         text = (

@@ -7,60 +7,25 @@ while; the pictures stay.
 
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from rig.api.calibrating import CalibratedLens, Calibrating, CalibratingOrder, CalibratingState, SeenTarget
-from rig.api.statement import Level, Statement
+from rig.api.statement import Statement
 from rig.background.child import run_child
 from rig.errors import StateForbidsError, StorageError
-from rig.phrase import Phrase, as_plain, from_plain, phrase
+from rig.phrase import as_plain, phrase
 from rig.settings.camera import Region
 from rig.settings.model import RigSettings
-from service.calibrating.folder import CALIBRATIONS, MOST, PICTURES, RESULT, numbers, remove_last
+from service.calibrating.folder import MOST, RESULT, PictureSet, new_folder, numbers, remove_last
+from service.calibrating.said import lens, problem_in, seen
 
 #: Without anybody who looks at it, the helper ends after so long a time.
 _LEASE_S: Final = 60.0
 _END_S: Final = 5.0
 _FINDING: Final = "service.calibrating.finding"
 _COMPUTING: Final = "service.calibrating.computing"
-_MIRRORED: Final = Statement(
-    level=Level.WARNING,
-    code="target_mirrored",
-    text="the picture shows the target in a mirror",
-    advice="turn off the mirror or flip of the camera",
-)
-
-
-@dataclass(frozen=True, slots=True)
-class _Set:
-    """The pictures that belong together.
-
-    Attributes:
-        folder: in which they are, and what is computed from them.
-        order: what was printed.
-        regions: of the cameras, by name: pictures of others are of another size.
-    """
-
-    folder: Path
-    order: CalibratingOrder
-    regions: dict[str, Region]
-
-    @property
-    def pictures(self) -> Path:
-        """The folder of the pictures."""
-        return self.folder / PICTURES
-
-    @property
-    def layout(self) -> dict[str, float]:
-        """As `analysis.targets.pattern.Layout` takes it."""
-        order = self.order
-        return {
-            "columns": order.columns, "rows": order.rows, "board_mm": order.square_mm, "single_mm": order.target_mm,
-        }  # fmt: skip
 
 
 class CalibrationHelper:
@@ -85,7 +50,7 @@ class CalibrationHelper:
         self._directory, self._rig, self._live, self._busy, self._keep = directory, rig, live, busy, keep
         self._lock, self._commands = threading.Lock(), threading.RLock()
         self._state, self._held = CalibratingState.OFF, False
-        self._set: _Set | None = None
+        self._set: PictureSet | None = None
         self._news: dict[str, Any] = {}
         self._problem: Statement | None = None
         self._lenses: tuple[CalibratedLens, ...] = ()
@@ -106,7 +71,7 @@ class CalibrationHelper:
                 full=len(taken) >= MOST,
                 folder=None if self._set is None else str(self._set.pictures),
                 taken=len(taken),
-                cameras=self._seen(),
+                cameras=() if self._set is None else self._seen(self._set.regions),
                 problem=self._problem,
                 lenses=self._lenses,
                 saved=self._saved,
@@ -130,7 +95,7 @@ class CalibrationHelper:
             self._end()
             with self._lock:
                 if known is None or order.anew or self._saved:
-                    known, self._news = _Set(self._new_folder(), printed, regions), {}
+                    known, self._news = PictureSet(new_folder(self._directory), printed, regions), {}
                 self._set, self._problem, self._lenses, self._saved = known, None, (), False
             self._start(CalibratingState.LOOKING, self._find)
             return self.view()
@@ -215,38 +180,11 @@ class CalibrationHelper:
         with self._commands:
             self._end()
 
-    def _seen(self) -> tuple[SeenTarget, ...]:
-        if self._set is None:
-            return ()
-        cameras: dict[str, Any] = self._news.get("cameras", {})
-        return tuple(
-            SeenTarget(
-                camera=name,
-                width=region.width,
-                height=region.height,
-                corners=said["corners"] if self._state is CalibratingState.LOOKING else (),
-                pictures=said["pictures"],
-                cells=said["cells"],
-                missing=tuple(_stated(from_plain(each)) for each in said["missing"]),
-            )
-            if (said := cameras.get(name)) is not None
-            else SeenTarget(camera=name, width=region.width, height=region.height)
-            for name, region in self._set.regions.items()
-        )
+    def _seen(self, regions: Mapping[str, Region]) -> tuple[SeenTarget, ...]:
+        cameras, looking = self._news.get("cameras", {}), self._state is CalibratingState.LOOKING
+        return tuple(seen(name, region, cameras.get(name), looking=looking) for name, region in regions.items())
 
-    def _new_folder(self) -> Path:
-        name = f"{datetime.now(UTC):%Y%m%d-%H%M%S}"
-        folder, number = self._directory / CALIBRATIONS / name, 1
-        while folder.exists():
-            number += 1
-            folder = folder.with_name(f"{name}-{number}")
-        try:
-            (folder / PICTURES).mkdir(parents=True)
-        except OSError as error:
-            raise StorageError(f"{folder}: cannot be made ({error.strerror}); look at the disk") from error
-        return folder
-
-    def _start(self, state: CalibratingState, work: Callable[[_Set], None]) -> None:
+    def _start(self, state: CalibratingState, work: Callable[[PictureSet], None]) -> None:
         if self._set is None:
             raise TypeError("there is no set of pictures")
         self._unwanted.clear()
@@ -264,7 +202,7 @@ class CalibrationHelper:
             if self._state in {CalibratingState.LOOKING, CalibratingState.COMPUTING}:
                 self._state = CalibratingState.OFF
 
-    def _find(self, pictures: _Set) -> None:
+    def _find(self, pictures: PictureSet) -> None:
         rig = self._rig()
 
         def wanted() -> bool:
@@ -281,12 +219,12 @@ class CalibrationHelper:
         end = self._run(_FINDING, asked, wanted, inherited=(self._live,), yielding=False)
         self._conclude(CalibratingState.OFF, CalibratingState.LOOKING, end)
 
-    def _compute(self, pictures: _Set) -> None:
+    def _compute(self, pictures: PictureSet) -> None:
         asked = {"folder": str(pictures.folder), "layout": pictures.layout}
         end = self._run(_COMPUTING, asked, lambda: not self._unwanted.is_set())
         if end is not None and "lenses" in end:
             with self._lock:
-                self._lenses = tuple(_lens(each) for each in end["lenses"])
+                self._lenses = tuple(lens(each) for each in end["lenses"])
         done = CalibratingState.FAILED if end is not None and "problem" in end else CalibratingState.DONE
         self._conclude(CalibratingState.OFF if end is None else done, CalibratingState.COMPUTING, end)
 
@@ -303,7 +241,7 @@ class CalibrationHelper:
             with self._lock:
                 if news:
                     self._news = {**self._news, **news}
-                    self._problem = _problem(news)
+                    self._problem = problem_in(news)
 
         def hold(held: bool) -> None:
             with self._lock:
@@ -329,19 +267,4 @@ class CalibrationHelper:
         with self._lock:
             if self._state is before:
                 self._state = now
-                self._problem = _problem(end or {})
-
-
-def _problem(said: dict[str, Any]) -> Statement | None:
-    if "problem" in said:
-        return _stated(from_plain(said["problem"])).model_copy(update={"level": Level.ERROR})
-    return _MIRRORED if said.get("mirrored") else None
-
-
-def _stated(said: Phrase) -> Statement:
-    return Statement(code=said.code, text=said.text, values=said.values)
-
-
-def _lens(said: dict[str, Any]) -> CalibratedLens:
-    advice = tuple(_stated(from_plain(each)) for each in said["advice"])
-    return CalibratedLens.model_validate({**said, "verdict": _stated(from_plain(said["verdict"])), "advice": advice})
+                self._problem = problem_in(end or {})

@@ -32,6 +32,7 @@ import { startLatest } from "./shared/latest.js";
 import { place, startRouter } from "./shared/router.js";
 import { update } from "./shared/store.js";
 import { startAim } from "./system/aim.js";
+import { drawCalibrating } from "./system/calibrating.js";
 import * as doctor from "./system/doctor.js";
 import { drawEarlier, enterEarlier, startEarlier } from "./system/earlier.js";
 import { startLog } from "./system/log.js";
@@ -60,6 +61,7 @@ function redraw() {
   drawCurves();
   drawJumps();
   drawEarlier();
+  drawCalibrating();
   drawKeys();
   drawPulses();
   drawAthlete();

@@ -1,6 +1,7 @@
 /** English. Every key stands in nb.js too (a test looks). */
 
 import { athletes } from "./en-athletes.js";
+import { calibrating } from "./en-calibrating.js";
 import { check } from "./en-check.js";
 import { digitize } from "./en-digitize.js";
 import { jump } from "./en-jump.js";
@@ -12,6 +13,7 @@ import { viewing } from "./en-viewing.js";
 
 export const en = {
   ...athletes,
+  ...calibrating,
   ...check,
   ...digitize,
   ...jump,

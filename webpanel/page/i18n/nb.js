@@ -1,6 +1,7 @@
 /** Norsk bokmål. De samme nøklene som i en.js. */
 
 import { athletes } from "./nb-athletes.js";
+import { calibrating } from "./nb-calibrating.js";
 import { check } from "./nb-check.js";
 import { digitize } from "./nb-digitize.js";
 import { jump } from "./nb-jump.js";
@@ -12,6 +13,7 @@ import { viewing } from "./nb-viewing.js";
 
 export const nb = {
   ...athletes,
+  ...calibrating,
   ...check,
   ...digitize,
   ...jump,

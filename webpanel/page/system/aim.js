@@ -7,6 +7,7 @@ import { number, quantity } from "../shared/format.js";
 import { tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
 import { ballsOf, startBalls } from "./balls.js";
+import { calibratingOf, startCalibrating } from "./calibrating.js";
 import { earlierOf } from "./earlier.js";
 import { lightOf, startLight } from "./light.js";
 
@@ -33,6 +34,7 @@ let picture = "";
 export function startAim() {
   startLight();
   startBalls();
+  startCalibrating();
   $("aim-again").addEventListener("click", () => { best.delete(camera); draw(); });
   watch(() => {
     draw();
@@ -112,6 +114,7 @@ function draw() {
   $("aim-empty").hidden = on && (shown !== null || (status?.pulses.arriving ?? false));
   $("aiming").hidden = !shown;
   ballsOf(camera);
+  calibratingOf(camera);
   if (shown) drawFigures(shown);
 }
 

@@ -55,6 +55,33 @@
  * @property {BallPlace[]} balls
  * @property {import("../shared/types.js").Statement|null} statement
  *
+ * @typedef {object} SeenTarget
+ * @property {string} camera
+ * @property {number} width
+ * @property {number} height
+ * @property {[number, number][]} corners
+ * @property {number} pictures
+ * @property {number[][]} cells
+ * @property {import("../shared/types.js").Statement[]} missing
+ *
+ * @typedef {object} CalibratedLens
+ * @property {string} camera
+ * @property {boolean} good
+ * @property {import("../shared/types.js").Statement} verdict
+ * @property {import("../shared/types.js").Statement[]} advice
+ * @property {[number, number, number, number][]} residuals
+ *
+ * @typedef {object} Calibrating
+ * @property {"off"|"looking"|"held"|"computing"|"done"|"failed"} state
+ * @property {boolean} still
+ * @property {boolean} full
+ * @property {string|null} folder
+ * @property {number} taken
+ * @property {SeenTarget[]} cameras
+ * @property {import("../shared/types.js").Statement|null} problem
+ * @property {CalibratedLens[]} lenses
+ * @property {boolean} saved
+ *
  * @typedef {object} RigView
  * @property {string} name
  * @property {string} toml

@@ -1,0 +1,95 @@
+"""Finds targets in triplets, one after the other, and keeps those pictures in which they are still in a new pose.
+
+The kept pictures on the disk are what counts: one that somebody removes is forgotten with the next look.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from analysis.targets.detection import Sight, find_targets
+from analysis.targets.moving import Watch
+from analysis.targets.pattern import Layout
+from analysis.targets.views import views
+from rig.errors import BadInputError
+from rig.frame import FrameStatus
+from rig.host.disk import replace_file
+from rig.images.picture import Grey, measurable
+from rig.phrase import as_plain
+from rig.settings.model import RigSettings
+from rig.transport.preview import PreviewImage
+from service.aids import frame_of, shown_as
+from service.calibrating.folder import MOST, kept_pictures, next_number, picture_path
+
+
+class Look:
+    """Looks at triplets.
+
+    Args:
+        rig: whose triplets they are.
+        layout: what was printed.
+        folder: of the kept pictures.
+    """
+
+    def __init__(self, rig: RigSettings, layout: Layout, folder: Path) -> None:
+        self._rig, self._layout, self._folder, self._watch = rig, layout, folder, Watch()
+        self._kept: dict[Path, Sight] = {}
+        self._number = next_number(folder)
+
+    def at(self, image: PreviewImage) -> dict[str, Any]:
+        """Look at a triplet, keep its pictures if it is time for it, and say what there is.
+
+        Raises:
+            OSError: a picture cannot be kept.
+        """
+        frames = {
+            camera.name: measurable(frame_of(image.pixels, self._rig, i), shown_as(self._rig))
+            for i, camera in enumerate(self._rig.cameras)
+            if image.statuses[i] is FrameStatus.OK
+        }
+        try:
+            seen = {name: find_targets(frame, self._layout, name) for name, frame in frames.items()}
+            self._remember()
+        except BadInputError as error:
+            return {"problem": as_plain(error.said)}
+        kept = {camera.name: self._kept_of(camera.name) for camera in self._rig.cameras}
+        if len({path.name for path in self._kept}) < MOST and (taken := self._watch.look(seen, kept)):
+            for name in sorted(taken):
+                self._keep(name, frames[name], seen[name])
+                kept[name].append(seen[name])
+            self._number += 1
+        return {
+            "still": self._watch.still,
+            "mirrored": any(sight.mirrored for sight in seen.values()),
+            "cameras": {name: self._said(seen.get(name), sights) for name, sights in kept.items()},
+        }
+
+    def _kept_of(self, camera: str) -> list[Sight]:
+        return [sight for path, sight in self._kept.items() if path.parent.name == camera]
+
+    def _keep(self, camera: str, frame: Grey, sight: Sight) -> None:
+        path = picture_path(self._folder, camera, self._number)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, cv2.imencode(".png", frame)[1].tobytes(), links=False)
+        self._kept[path] = sight
+
+    def _remember(self) -> None:
+        """Forget pictures that are gone, and look at those that an earlier program has kept."""
+        there = kept_pictures(self._folder)
+        self._kept = {path: sight for path, sight in self._kept.items() if path in there}
+        for path in there:
+            if path not in self._kept and (image := cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)) is not None:
+                self._kept[path] = find_targets(np.asarray(image, np.uint8), self._layout, path.name)
+
+    def _said(self, sight: Sight | None, kept: Sequence[Sight]) -> dict[str, Any]:
+        """What a camera shows now, and what its kept pictures show."""
+        shown = views(kept, self._layout)
+        return {
+            "corners": [] if sight is None else [(round(c.x, 2), round(c.y, 2)) for c in sight.corners.values()],
+            "pictures": shown.pictures,
+            "cells": shown.cells.tolist(),
+            "missing": [as_plain(each) for each in shown.missing],
+        }

@@ -1,0 +1,130 @@
+"""The calibration helper of the Focus view: what it says and offers."""
+
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from rig.api.calibrating import CalibratedLens, CalibratingState, SeenTarget
+from rig.api.statement import Level, Statement
+from tests.browser.conftest import Open
+from tests.browser.views import AXE, BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL, assert_fits_a_phone
+from tests.webpanel.memory_service import CAMERAS, MemoryService
+from tests.webpanel.serving import Panel
+
+_TURN: Final = Statement(
+    code="target_roll",
+    text="turn the camera or the target by 90 degrees about the line of sight: 1 of 2 such pictures",
+    values={"count": 1, "wanted": 2},
+)
+_MORE: Final = Statement(code="target_more", text="take more pictures: 4 of 9 to 15", values={"count": 4, "wanted": 9})
+_SEEN: Final = tuple(
+    SeenTarget(
+        camera=name,
+        width=160,
+        height=120,
+        corners=((40.0, 30.0), (60.5, 31.0), (41.0, 50.5)),
+        pictures=4,
+        cells=tuple(tuple((x + y) % 3 for x in range(8)) for y in range(6)),
+        missing=(_TURN, _MORE) if name == "K1" else (),
+    )
+    for name in CAMERAS
+)
+
+
+def _lens(name: str, *, good: bool) -> CalibratedLens:
+    words = "good enough" if good else "NOT good enough"
+    values: dict[str, Any] = {"camera": name, "wanted": "1000", "lens_px": 0.0083, "one_to": 77000, "needed": 3000}
+    text = (
+        f"camera {name}: {words} for 1:1000: the lens is known to 0.0083 px (1:77000 of the picture's width; 1:3000 is "
+        "needed)"
+    )
+    return CalibratedLens(
+        camera=name,
+        good=good,
+        verdict=Statement(code="target_good" if good else "target_not_good", text=text, values=values),
+        advice=() if good else (_MORE,),
+        residuals=((30.0, 40.0, 0.004, 0.0), (90.0, 60.0, 0.0, -0.02)),
+    )
+
+
+def _grave(page: Page) -> list[str]:
+    page.evaluate(AXE.read_text())
+    found: dict[str, Any] = page.evaluate("axe.run('#aim', { resultTypes: ['violations'] })")
+    return [f"{each['id']}: {each['nodes'][0]['html']}" for each in found["violations"] if each["impact"] != "minor"]
+
+
+def _assert_sound(page: Page) -> None:
+    """Axe finds nothing, nothing is cut off or too small for a glove."""
+    assert _grave(page) == []
+    assert page.evaluate(BROKEN) == []
+    assert not page.evaluate(TOO_SMALL, SMALLEST_TOUCH_PX)
+
+
+def test_it_says_what_to_show_and_offers_what_can_be_done(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    page = open_page(f"{panel.url}/#/aim", width=360, height=780, color_scheme="dark", has_touch=True)
+    service.arm()
+    expect(page.locator("#aim-image")).not_to_have_js_property("naturalWidth", 0)
+    page.get_by_text("What was printed").click()
+    page.get_by_role("spinbutton", name="Squares across").fill("11")
+    service.calibrating.show(cameras=_SEEN, taken=4)
+    page.get_by_role("button", name="Take pictures").click()
+    expect(page.locator("#calibrating-said")).to_have_text("Target found. Hold it still.")
+    assert (service.calibrating.orders[0].columns, service.calibrating.orders[0].anew) == (11, False)
+    expect(page.locator("#calibrating-missing li")).to_have_text([_TURN.text, _MORE.text])
+    expect(page.locator("#calibrating-over circle")).to_have_count(3)
+    expect(page.locator("#calibrating-over .has")).to_have_count(32)
+    boxes = "ids => ids.map(id => JSON.stringify(document.getElementById(id).getBoundingClientRect()))"
+    live, over = page.evaluate(boxes, ["aim-image", "calibrating-over"])
+    assert live == over
+    _assert_sound(page)
+    assert_fits_a_phone(page)
+    page.locator("#aim-cameras button").nth(1).click()
+    expect(page.locator("#calibrating-missing li")).to_have_text(["K2 has all it needs."])
+    service.calibrating.show(still=True)
+    expect(page.locator("#calibrating-said")).to_have_text("Still. Now move it to another pose.")
+    service.calibrating.show(state=CalibratingState.HELD)
+    expect(page.locator("#calibrating-said")).to_have_text("Waits while a recording runs.")
+    service.calibrating.show(
+        state=CalibratingState.LOOKING,
+        problem=Statement(level=Level.WARNING, code="target_mirrored", text="it is mirrored", advice="turn it off"),
+    )
+    expect(page.locator("#calibrating-problem")).to_have_text("it is mirrored: turn it off")
+    page.get_by_role("button", name="Take the last one back").click()
+    expect(page.locator("#calibrating-counts dd").first).to_have_text("3")
+    service.calibrating.show(problem=None)
+    page.get_by_role("button", name="Compute the calibration").click()
+    expect(page.locator("#calibrating-said")).to_contain_text("being computed")
+    expect(page.get_by_role("button", name="Stop", exact=True)).to_be_visible()
+    service.disarm()
+    lenses = tuple(_lens(name, good=name != "K3") for name in CAMERAS)
+    service.calibrating.show(state=CalibratingState.DONE, lenses=lenses)
+    expect(page.locator(".lens")).to_have_count(3)
+    expect(page.locator(".lens").nth(2)).to_contain_text("Not good enough for 1:1000")
+    expect(page.locator(".lens").nth(2)).to_contain_text(_MORE.text)
+    expect(page.locator("#calibrating-residuals .arrow")).to_have_count(2)
+    expect(page.locator("#calibrating-residuals-words")).to_contain_text("the longest is 0.020 px")
+    _assert_sound(page)
+    page.get_by_role("button", name="Put it into the rig file").click()
+    expect(page.locator("#calibrating-saved")).to_be_visible()
+    assert service.calibrating.shown.saved
+
+
+@pytest.mark.parametrize(("look", "width"), [("light", 768), pytest.param("dark", 1280, marks=pytest.mark.long)])
+def test_it_is_said_in_norwegian_on_a_wider_screen(
+    panel: Panel, service: MemoryService, open_page: Open, look: str, width: int
+) -> None:
+    service.arm()
+    lenses = tuple(_lens(name, good=name != "K3") for name in CAMERAS)
+    service.calibrating.show(state=CalibratingState.LOOKING, cameras=_SEEN, taken=4)
+    page = open_page(f"{panel.url}/#/aim", width=width, height=1000, locale="nb-NO", color_scheme=look)
+    expect(page.locator("#calibrating-missing li").first).to_have_text(
+        "drei kameraet eller målet 90 grader om siktelinjen: 1 av 2 slike bilder"
+    )
+    _assert_sound(page)
+    service.calibrating.show(state=CalibratingState.DONE, lenses=lenses)
+    expect(page.locator(".lens").first).to_contain_text("objektivet er kjent til 0,0083 px (1:77 000 av bildets bredde")
+    expect(page.locator(".lens").nth(2)).to_contain_text("ta flere bilder: 4 av 9 til 15")
+    _assert_sound(page)

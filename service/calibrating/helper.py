@@ -84,8 +84,7 @@ class CalibrationHelper:
             StorageError: no folder can be made for them.
         """
         with self._commands:
-            regions = {camera.name: camera.region for camera in self._rig().cameras}
-            known = self._set
+            regions, known = self._regions(), self._set
             printed = order.model_copy(update={"anew": False})
             if known is not None and (known.order, known.regions) == (printed, regions):
                 if self._state is CalibratingState.LOOKING and not order.anew:
@@ -110,7 +109,7 @@ class CalibrationHelper:
         """Remove the pictures that were kept last.
 
         Raises:
-            StateForbidsError: there are none, or a calibration is being computed from them.
+            StateForbidsError: there are none, or a calibration is being computed from them or is in use.
             StorageError: the disk refuses.
         """
         with self._commands:
@@ -118,6 +117,7 @@ class CalibrationHelper:
                 raise StateForbidsError(
                     "a calibration is being computed: wait until it is done, then take pictures away"
                 )
+            self._check_unsaved()
             try:
                 if self._set is None or not remove_last(self._set.pictures):
                     raise StateForbidsError(
@@ -134,11 +134,12 @@ class CalibrationHelper:
         """Compute a calibration from the pictures.
 
         Raises:
-            StateForbidsError: there are no pictures.
+            StateForbidsError: there are no pictures, or the calibration by them is in use.
         """
         with self._commands:
             if self._state is CalibratingState.COMPUTING:
                 return self.view()
+            self._check_unsaved()
             if self._set is None or not numbers(self._set.pictures):
                 raise StateForbidsError(
                     "there are no pictures to compute from: hold the target before the cameras first"
@@ -153,13 +154,20 @@ class CalibrationHelper:
         """Put the calibration into the rig file, and into all logs from now on.
 
         Raises:
-            StateForbidsError: none is computed, or a recording runs.
+            StateForbidsError: none is computed, a recording runs, or a region has been changed since.
             BadInputError: a camera has none.
             StorageError: the rig file cannot be written.
         """
         with self._commands:
             if self._state is not CalibratingState.DONE or self._set is None:
                 raise StateForbidsError("there is no calibration yet: compute it, then put it into the rig file")
+            now = self._regions()
+            changed = [name for name, region in self._set.regions.items() if now.get(name) != region]
+            if changed:
+                raise StateForbidsError(
+                    f"the region of {', '.join(changed)} was changed since the pictures were taken: give it back, or "
+                    "take pictures anew"
+                )
             self._keep(self._set.folder / RESULT)
             with self._lock:
                 self._saved = True
@@ -179,6 +187,14 @@ class CalibrationHelper:
         """End what runs."""
         with self._commands:
             self._end()
+
+    def _regions(self) -> dict[str, Region]:
+        return {camera.name: camera.region for camera in self._rig().cameras}
+
+    def _check_unsaved(self) -> None:
+        """Check that the rig file does not name what is computed from these pictures."""
+        if self._saved:
+            raise StateForbidsError("the calibration by these pictures is in the rig file: begin anew for another one")
 
     def _seen(self, regions: Mapping[str, Region]) -> tuple[SeenTarget, ...]:
         cameras, looking = self._news.get("cameras", {}), self._state is CalibratingState.LOOKING
@@ -207,8 +223,7 @@ class CalibrationHelper:
 
         def wanted() -> bool:
             looked_at = time.monotonic() - self._looked < _LEASE_S
-            now = {camera.name: camera.region for camera in self._rig().cameras}
-            return looked_at and now == pictures.regions and not self._unwanted.is_set()
+            return looked_at and self._regions() == pictures.regions and not self._unwanted.is_set()
 
         asked = {
             "fd": self._live,

@@ -9,6 +9,7 @@ import pytest
 
 from rig.api.calibrating import CalibratingOrder, CalibratingState
 from rig.errors import StateForbidsError
+from rig.settings.camera import Region
 from rig.transport.preview import PreviewSlot
 from service.calibrating.folder import kept_pictures, next_number, numbers, picture_path, remove_last
 from service.calibrating.helper import CalibrationHelper
@@ -69,6 +70,30 @@ def test_pictures_go_on_unless_it_is_begun_anew_or_with_another_target(tmp_path:
         other = helper.begin(CalibratingOrder(columns=11))
         assert (other.folder != first, other.taken) == (True, 0)
         assert helper.begin(CalibratingOrder(columns=11, anew=True)).folder not in {first, other.folder}
+
+
+def test_what_is_in_the_rig_file_is_not_touched_and_other_regions_are_refused(
+    tmp_path: Path, slot: PreviewSlot
+) -> None:
+    kept: list[Path] = []
+    rigs = [SIM]
+    with closing(CalibrationHelper(tmp_path, lambda: rigs[0], slot.fd, lambda: False, kept.append)) as helper:
+        folder = helper.begin(CalibratingOrder()).folder
+        assert folder is not None
+        _keep(Path(folder), 1, "K1")
+        helper.end()
+        helper._state = CalibratingState.DONE  # as after computing, which takes a minute
+        first = SIM.cameras[0].model_copy(update={"region": Region(width=320, height=240)})
+        rigs[0] = SIM.model_copy(update={"cameras": (first, *SIM.cameras[1:])})
+        with pytest.raises(StateForbidsError, match="the region of K1 was changed"):
+            helper.save()
+        rigs[0] = SIM
+        assert helper.save().saved
+        assert kept == [Path(folder).parent / "calibration.json"]
+        for call in (helper.undo, helper.compute):
+            with pytest.raises(StateForbidsError, match="begin anew"):
+                call()
+        assert helper.begin(CalibratingOrder()).folder != folder
 
 
 def test_pictures_that_no_calibration_comes_of_are_told(tmp_path: Path, slot: PreviewSlot) -> None:

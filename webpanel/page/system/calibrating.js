@@ -109,7 +109,7 @@ export function drawCalibrating() {
   setText($("calibrating-begin"), t(taken ? "calibrating.go_on" : "calibrating.begin"));
   $("calibrating-anew").hidden = isWorking() || !taken;
   $("calibrating-stop").hidden = !isWorking();
-  $("calibrating-undo").hidden = !taken || state === "computing";
+  $("calibrating-undo").hidden = !taken || state === "computing" || (helper?.saved ?? false);
   $("calibrating-compute").hidden = !taken || state === "computing" || state === "done";
   for (const name of ["begin", "anew", "stop", "undo", "compute", "save"]) $(`calibrating-${name}`).disabled = ordered;
   $("aim").classList.toggle("helping", looking);

@@ -1,14 +1,26 @@
-"""The calibration helper of the Focus view: what it says and offers."""
+"""The calibration helper of the Focus view: what it says and offers, and the whole of it with the real service."""
 
+import json
+import re
+from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import pytest
+from mcap.reader import make_reader
 from playwright.sync_api import Page, expect
+from scipy.stats import chi2
 
 from rig.api.calibrating import CalibratedLens, CalibratingState, SeenTarget
 from rig.api.statement import Level, Statement
+from rig.settings.file import CONFIG, load_rig
+from simrig.world.scenario import load_scenario
 from tests.browser.conftest import Open
+from tests.browser.jumps.test_training import arm
 from tests.browser.views import AXE, BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL, assert_fits_a_phone
+from tests.service.serving import serving
+from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import CAMERAS, MemoryService
 from tests.webpanel.serving import Panel
 
@@ -128,3 +140,99 @@ def test_it_is_said_in_norwegian_on_a_wider_screen(
     expect(page.locator(".lens").first).to_contain_text("objektivet er kjent til 0,0083 px (1:77 000 av bildets bredde")
     expect(page.locator(".lens").nth(2)).to_contain_text("ta flere bilder: 4 av 9 til 15")
     _assert_sound(page)
+
+
+#: The two cameras of the whole way, and how long it may take with the processor time that nobody else wants.
+_NAMES: Final = ("K2", "K3")
+_PATIENCE_S: Final = 240.0
+#: That a calibration is taken for wrong which is not.
+_CHANCE: Final = 1e-4
+
+
+def _board_rig(folder: Path, loopback: Loopback) -> Path:
+    """A rig with a calibration scenario whose poses change quickly."""
+    scenario = CONFIG / "scenarios" / "calibration.toml"
+    (folder / "scenario.toml").write_text(f'base = "{scenario}"\n[board]\nstill_s = 3.0\nmoving_s = 0.3\n')
+    cameras = "".join(f'[[cameras]]\nname = "{name}"\nbackend = "sim"\n' for name in _NAMES)
+    rig = folder / "rig.toml"
+    rig.write_text(
+        'name = "board"\n# as it was delivered\n[trigger]\nsource = "external"\nrate_hz = 10.0\n[simulation]\n'
+        f'scenario = "scenario.toml"\n[network]\npublish = "{loopback.endpoint()}"\n{cameras}'
+    )
+    return rig
+
+
+def _assert_agrees(result: dict[str, Any], scenario: Path) -> None:
+    """The calibrated cameras are the simulated ones: their errors together are such as their covariance allows.
+
+    Eleven parameters one by one would be beyond 2.5 sigma in one of eight runs by chance; which pictures are kept, and
+    so their noise, differs from run to run.
+    """
+    assert 0.9 < result["global_test"]["ratio"] < 1.1
+    truth = load_scenario(scenario)
+    for name in _NAMES:
+        camera = truth.cameras[truth.camera_index(name)]
+        true, found = {"c": camera.c, **camera.lens.model_dump()}, result["cameras"][name]
+        off = np.array([(found[each] - true[each]) / sigma for each, sigma in found["sigma"].items()])
+        names = list(found["sigma"])
+        together = np.eye(len(names))
+        for pair, value in found["correlations"].items():
+            i, j = (names.index(each) for each in pair.split("|"))
+            together[i, j] = together[j, i] = value
+        assert off @ np.linalg.solve(together, off) < chi2.ppf(1.0 - _CHANCE, len(off)), (name, off)
+
+
+def _attached(log: Path) -> dict[str, Any]:
+    """`calibration.json` of a log."""
+    with log.open("rb") as file:
+        found = {each.name: each.data for each in make_reader(file).iter_attachments()}
+    content: dict[str, Any] = json.loads(found["calibration.json"])
+    return content
+
+
+@pytest.mark.long
+@pytest.mark.timeout(600)
+def test_a_board_held_before_the_cameras_calibrates_them(tmp_path: Path, loopback: Loopback, open_page: Open) -> None:
+    rig = _board_rig(tmp_path, loopback)
+    with serving(tmp_path, rig, loopback) as service:
+        page = open_page(service.url, width=360, height=780)
+        arm(page)
+        page.goto(f"{service.url}/#/aim")
+        page.get_by_role("button", name="Take pictures").click()
+        pulses = page.locator("#calibrating-counts dd").first
+
+        def taken() -> int:
+            return int(pulses.inner_text() or 0)
+
+        wait_until(lambda: taken() >= 2, "pictures are kept by themselves", _PATIENCE_S, 0.2)
+        recording = service.post("/api/recordings")["id"]
+        expect(page.locator("#calibrating-said")).to_have_text("Waits while a recording runs.")
+        refused_then = service.call("POST", "/api/calibration/save")
+        assert refused_then[0] == 409
+        service.post(f"/api/recordings/{recording}/stop")
+        wait_until(lambda: taken() >= 3, "it goes on", _PATIENCE_S, 0.2)
+        before = service.get("/api/calibration")["taken"]
+        page.get_by_role("button", name="Take the last one back").click()
+        wait_until(lambda: taken() == before - 1, "the last one is gone", 20, 0.02)
+        wait_until(lambda: taken() >= 12, "there are enough", _PATIENCE_S, 0.2)
+        expect(page.locator("#calibrating-missing li")).to_have_text([re.compile("has all it needs")])
+        pictures = Path(service.get("/api/calibration")["folder"])
+        page.get_by_role("button", name="Compute the calibration").click()
+        expect(page.locator("#calibrating-said")).to_contain_text("being computed")
+        service.post("/api/disarm")  # simulated cameras take the processor that the computing waits for
+        good = page.locator('.lens[data-level="good"]')
+        expect(good).to_have_count(len(_NAMES), timeout=_PATIENCE_S * 1000)
+        expect(page.locator("#calibrating-residuals .arrow").first).to_be_attached()
+        assert "good enough for 1:1000" in service.text("/api/calibration/protocol.html")
+        page.get_by_role("button", name="Put it into the rig file").click()
+        expect(page.locator("#calibrating-saved")).to_be_visible()
+        service.post("/api/arm")
+        service.await_state("armed")
+        recording = service.post("/api/recordings")["id"]
+        service.post(f"/api/recordings/{recording}/stop")
+        log = service.data / f"{recording}.mcap"
+    result = json.loads((pictures.parent / "calibration.json").read_bytes())
+    _assert_agrees(result, tmp_path / "scenario.toml")
+    assert load_rig(rig).calibration == pictures.parent / "calibration.json"
+    assert "# as it was delivered" in rig.read_text()
+    assert _attached(log)["cameras"] == result["cameras"]

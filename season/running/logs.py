@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from typing import Final
 
@@ -71,8 +71,8 @@ def find_logs(campaign: Campaign) -> list[SeasonLog]:
 
 
 def with_outcomes(logs: Sequence[SeasonLog], outcomes: Mapping[str, Outcome]) -> list[SeasonLog]:
-    """The logs with what has come of them since, by their address."""
-    return [SeasonLog(log.entry, log.hill, log.orienting, outcomes.get(log.url, log.outcome)) for log in logs]
+    """The logs with what has come of them since, by their address; a result that does not hold any more is none."""
+    return [replace(log, outcome=outcomes.get(log.url, log.outcome if log.is_settled else None)) for log in logs]
 
 
 def day_of(url: str) -> date | None:

@@ -69,8 +69,10 @@ def measure_logs(
     todo = [log for log in logs if not log.is_settled or (again and _failed(log))]
     state.write()
     if todo:
-        logs = with_outcomes(logs, _measure(todo, campaign, state, dashboard, started, progress))
-    state.write()
+        try:
+            logs = with_outcomes(logs, _measure(todo, campaign, state, dashboard, started, progress))
+        finally:
+            state.write()
     return logs, state
 
 
@@ -105,7 +107,11 @@ class _Hearer:
         self._state.run(name)
 
     def done(self, name: str) -> None:
-        found = decoded(read_outcomes([name], self._options)[0])
+        try:
+            found = decoded(read_outcomes([name], self._options)[0])
+        except BadInputError as error:  # the store does not answer now
+            self._fail(name, str(error))
+            return
         if found is None:  # somebody has removed it, or this computer does not see the worker's disk
             self._fail(name, f"its result is not beside it: is {name} the same log here and where the workers are?")
         else:

@@ -8,6 +8,7 @@ from typing import Final
 
 import msgspec
 
+from rig.errors import StorageError
 from rig.host.disk import replace_file
 from season.running.logs import SeasonLog
 from season.running.outcome import LogState, Outcome
@@ -109,13 +110,18 @@ class SeasonState:
         """Write the file.
 
         Raises:
-            OSError: the disk refuses.
+            StorageError: the disk refuses.
         """
         for url, entry in self.logs.items():
             if entry.state is LogState.RUNNING:
                 entry.duration_s = self.running_s(url)
         content = msgspec.json.encode(_File(FORMAT, self._campaign, self.counts, self.logs))
-        replace_file(self._path, content + b"\n", links=False)
+        try:
+            replace_file(self._path, content + b"\n", links=False)
+        except OSError as error:
+            raise StorageError(
+                f"{self._path}: cannot be written ({error.strerror}); make room, then run again"
+            ) from error
         self._written = time.monotonic()
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from rig.errors import BadInputError
 from season.campaign import read_campaign
-from season.running.logs import day_of, find_logs
+from season.running.logs import day_of, find_logs, with_outcomes
+from tests.season.drawn import draw_season
 from tests.season.files import SURVEY, campaign_file, log_file
 
 
@@ -68,3 +69,13 @@ def test_the_day_of_a_log_is_that_of_its_name() -> None:
     assert day_of("/data/2026-11-21T19-40-18Z.mcap") == date(2026, 11, 21)
     assert day_of("s3://bucket/2026-13-21T19-40-18Z.mcap") is None
     assert day_of("jump.mcap") is None
+
+
+def test_a_result_by_another_survey_does_not_count(tmp_path: Path) -> None:
+    season = draw_season(tmp_path, jumps=2)
+    assert all(log.is_settled for log in find_logs(season.campaign))
+    survey = tmp_path / SURVEY
+    survey.write_text(survey.read_text() + " ")
+    logs = find_logs(season.campaign)
+    assert not any(log.is_settled for log in logs)
+    assert [log.outcome for log in with_outcomes(logs, {})] == [None, None]

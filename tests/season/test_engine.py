@@ -10,6 +10,7 @@ import pytest
 
 from tests.season.files import campaign_file, log_file
 from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
 
 
 def run_tiny(folder: Path, names: list[str], timeout_s: float = 60) -> dict[str, Any]:
@@ -51,3 +52,43 @@ def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, loopback: Loo
     )
     assert done.returncode == 2
     assert f"{address}: no Dask scheduler answers there" in done.stderr
+
+
+@pytest.mark.long
+@pytest.mark.timeout(600)
+def test_the_memory_of_the_scheduler_does_not_grow_with_the_season(tmp_path: Path) -> None:
+    few = run_tiny(tmp_path, [f"a{number}" for number in range(100)])
+    many = run_tiny(tmp_path, [f"b{number}" for number in range(10_000)], timeout_s=500)
+    assert set(many["ended"].values()) == {"done"}
+    assert len(many["ended"]) == 10_000
+    assert many["most_mb"] < 300  # scheduler and client are in one process
+    assert many["most_mb"] < few["most_mb"] + 60
+
+
+@pytest.mark.long
+def test_workers_of_another_scheduler_measure_too(tmp_path: Path, loopback: Loopback) -> None:
+    logs = [log_file(tmp_path / "hill" / f"{number}.mcap", b"damaged") for number in range(3)]
+    port = loopback.free_port()
+    address = f"tcp://{loopback.host}:{port}"
+    dask = [sys.executable, "-m", "dask"]
+    options = ["--host", loopback.host, "--no-dashboard"]
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with (
+        subprocess.Popen([*dask, "scheduler", "--port", str(port), *options], **quiet) as scheduler,
+        subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-nanny", *options], **quiet) as worker,
+    ):
+        command = [sys.executable, "-m", "svev", "season", "run", str(campaign_file(tmp_path)), "--json"]
+
+        def run() -> "subprocess.CompletedProcess[str]":
+            return subprocess.run(
+                [*command, "--scheduler", address], capture_output=True, text=True, timeout=100, check=False
+            )
+
+        wait_until(
+            lambda: (done := run()).returncode == 0 or "has no workers" not in done.stderr, "it has a worker", 100
+        )
+        found = json.loads(run().stdout)
+        for process in (worker, scheduler):
+            process.terminate()
+            process.wait(20)
+    assert found["failed"] == len(logs)

@@ -64,7 +64,8 @@ def run_command(
     chosen = {"scheduler": scheduler, "workers": workers, "memory_gb": memory_gb}
     cluster = read.cluster.model_copy(update={name: value for name, value in chosen.items() if value is not None})
     read = read.model_copy(update={"cluster": cluster})
-    with alone(read), _Progress(as_json) as bar:
+    memory = None if cluster.scheduler else f"{cluster.memory_gb:g} GB"
+    with alone(read), _Progress(memory, as_json=as_json) as bar:
         logs, state = measure_logs(read, again=again, dashboard=dashboard, started=bar.start, progress=bar.tick)
         bar.close()
         if build(read, logs) or not (read.out / NAME).exists():
@@ -93,9 +94,15 @@ def run_command(
 
 
 class _Progress:
-    """A progress bar that begins when the number of logs to measure is known."""
+    """A progress bar that begins when the number of logs to measure is known.
 
-    def __init__(self, as_json: bool) -> None:
+    Args:
+        memory: the most memory of a worker of this computer, in words.
+        as_json: whether standard output is for JSON.
+    """
+
+    def __init__(self, memory: str | None, *, as_json: bool) -> None:
+        self._memory = memory
         self._as_json = as_json
         self._stack = ExitStack()
         self._tell: Callable[[int], None] | None = None
@@ -112,7 +119,8 @@ class _Progress:
 
     def start(self, logs: int, threads: int, dashboard: str | None) -> None:
         """Show it."""
-        shown = f"; dashboard: {dashboard}" if dashboard else ""
+        each = f" with at most {self._memory} of memory each" if self._memory else ""
+        shown = f"{each}; dashboard: {dashboard}" if dashboard else each
         console.say(f"measuring {logs} logs on {threads} processors{shown}", aside=self._as_json)
         self._tell = self._stack.enter_context(console.progress("measuring", logs))
 

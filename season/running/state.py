@@ -1,5 +1,6 @@
 """The state of a run, in a file that is always whole: who looks at it sees every log, with its state and duration."""
 
+import math
 import time
 from collections.abc import Iterable
 from datetime import UTC, datetime
@@ -60,13 +61,11 @@ class SeasonState:
     def __init__(self, path: Path, campaign: str, logs: Iterable[SeasonLog]) -> None:
         self._path, self._campaign = path, campaign
         self._started: dict[str, float] = {}
-        self._written = -_EVERY_S
-        now = _now()
-        self.logs: dict[str, StateEntry] = {}
-        for log in logs:
-            self.logs[log.url] = StateEntry(state=LogState.WAITING, since=now)
-            if log.is_settled and log.outcome is not None:
-                self.settle(log.url, log.outcome)
+        self._written = -math.inf
+        waiting = StateEntry(state=LogState.WAITING, since=_now())
+        self.logs = {
+            log.url: _settled(log.outcome) if log.is_settled and log.outcome is not None else waiting for log in logs
+        }
 
     def run(self, url: str) -> None:
         """A log is being measured."""
@@ -76,10 +75,7 @@ class SeasonState:
 
     def settle(self, url: str, outcome: Outcome) -> None:
         """Something has come of a log."""
-        self.logs[url] = StateEntry(
-            state=outcome.state, since=outcome.started, duration_s=outcome.duration_s, problem=outcome.problem,
-            key=outcome.key, jumps=outcome.jumps, host=outcome.host,
-        )  # fmt: skip
+        self.logs[url] = _settled(outcome)
         self.write_sometimes()
 
     def fail(self, url: str, problem: str) -> None:
@@ -123,6 +119,13 @@ class SeasonState:
                 f"{self._path}: cannot be written ({error.strerror}); make room, then run again"
             ) from error
         self._written = time.monotonic()
+
+
+def _settled(outcome: Outcome) -> StateEntry:
+    return StateEntry(
+        state=outcome.state, since=outcome.started, duration_s=outcome.duration_s, problem=outcome.problem,
+        key=outcome.key, jumps=outcome.jumps, host=outcome.host,
+    )  # fmt: skip
 
 
 def _now() -> str:

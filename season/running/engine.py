@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, Protocol
 
 import dask
@@ -61,10 +62,12 @@ class Engine:
     Attributes:
         client: connected to its scheduler.
         dashboard: address of Dask's own page; None if there is none.
+        restore: has workers started again that were lost, which Dask gives up if they die while they start.
     """
 
     client: Client
     dashboard: str | None
+    restore: Callable[[], None]
 
     @property
     def threads(self) -> int:
@@ -93,7 +96,7 @@ def engine(cluster: Cluster, dashboard: str) -> Iterator[Engine]:
                 ) as local,
                 Client(local) as client,
             ):  # fmt: skip
-                yield Engine(client, local.dashboard_link)
+                yield Engine(client, local.dashboard_link, partial(local.scale, count))
             return
         try:
             client = Client(cluster.scheduler, timeout=_CONNECT_S)
@@ -106,7 +109,7 @@ def engine(cluster: Cluster, dashboard: str) -> Iterator[Engine]:
                 raise BadInputError(
                     f"{cluster.scheduler}: has no workers; start some by `dask worker {cluster.scheduler}`"
                 )
-            yield Engine(client, client.dashboard_link)
+            yield Engine(client, client.dashboard_link, lambda: None)
 
 
 def run_tasks(on: Engine, function: Callable[..., Any], arguments: Mapping[str, Any], hearer: Hearer) -> None:
@@ -183,6 +186,7 @@ class _Run:
                 time.sleep(_LOOK_S)  # all workers are being started again
             if self._on.threads:
                 return set()
+            self._on.restore()
         raise _gone(f"no worker for {_PATIENCE * _LOOK_S:g} s")
 
     def _end(self, name: str, future: Future[Any]) -> None:

@@ -7,13 +7,13 @@ one pose of the jump, and everything after them need not know of the shake.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
+import cv2
 import numpy as np
 
+from analysis.candidates.foreground.background import Region
 from analysis.candidates.markers.known_discs import DiscShape
-from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots, Trace
-from analysis.candidates.skis.wanted_traces import WantedTraces
+from analysis.candidates.model import ImageCandidates, PulseCandidates, SecondLook, Spots
 from analysis.measurements.model import (
     ImageMeasurements,
     JumpMeasurements,
@@ -22,7 +22,7 @@ from analysis.measurements.model import (
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.camera_model import distort
 from photogrammetry.geometry.rotation import rotation_from_vector
-from rig.arrays import Floats
+from rig.arrays import Floats, Integers
 from rig.pulse import PulseNumber
 
 _DIFFERENCE = 1e-6  # rad, for derivatives
@@ -84,10 +84,7 @@ class Standing:
             joined = replace(joined, xy=xy, covariance=joined.covariance + added)
             ends = np.cumsum([0, *map(len, spots)])
             for i, first, last in zip(shaken, ends[:-1], ends[1:], strict=True):
-                steady = partial(_steadied_traces, self.system[name], shakes[seen[i].pulse])
-                wanted = images[i][name].traces
-                traces = wanted.changed(steady) if isinstance(wanted, WantedTraces) else steady(tuple(wanted))
-                images[i][name] = ImageCandidates(joined.only(np.arange(first, last)), traces)
+                images[i][name] = ImageCandidates(joined.only(np.arange(first, last)))
         return [replace(pulse, images=own) for pulse, own in zip(seen, images, strict=True)]
 
     def measurements(self, seen: PulseMeasurements) -> PulseMeasurements:
@@ -139,6 +136,28 @@ class _SteadyLook:
         found = self._look.fit_discs(pulses, camera, self._in_frames(pulses, camera, xy), shape)
         return self._steadied(pulses, camera, found)
 
+    def part(self, pulse: PulseNumber, camera: str, low: Integers, high: Integers) -> Region | None:
+        """See `SecondLook`; what a shaken frame shows is brought to where the camera of the jump would show it."""
+        placed = self._standing.system[camera]
+        low, high = np.maximum(low, 0), np.minimum(high, placed.size.astype(int))
+        if pulse not in self._standing.shake.get(camera, {}) or (high - low <= 1).any():
+            return self._look.part(pulse, camera, low, high)
+        corners = np.array([low, (high[0] - 1, low[1]), (low[0], high[1] - 1)], float)
+        there = self._in_frames([pulse] * len(corners), camera, corners)
+        whole = np.concatenate((there, [there[1] + there[2] - there[0]]))
+        seen = self._look.part(pulse, camera, np.floor(whole.min(axis=0)).astype(int), _behind(whole))
+        if seen is None:
+            return None
+        # a small turn moves what is near together like a plane
+        back = cv2.getAffineTransform((corners - low).astype(np.float32), (there - (seen.x, seen.y)).astype(np.float32))
+        size, how = (int(high[0] - low[0]), int(high[1] - low[1])), cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        grey, behind, sigma, noise = (
+            np.asarray(cv2.warpAffine(layer, back, size, flags=how, borderMode=cv2.BORDER_REPLICATE), np.float32)
+            for layer in (seen.grey, seen.behind, seen.sigma, seen.noise)
+        )
+        front = cv2.warpAffine(seen.front.astype(np.uint8), back, size, flags=how) > 0
+        return Region(int(low[0]), int(low[1]), grey, behind, sigma, noise, front)
+
     def _in_frames(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats) -> Floats:
         """Where the frames of n pulses show places (n, 2)."""
         there, shakes = self._shaken(pulses, camera)
@@ -163,6 +182,11 @@ class _SteadyLook:
         shakes = self._standing.shake.get(camera, {})
         there = [i for i, pulse in enumerate(pulses) if pulse in shakes]
         return there, [shakes[pulses[i]] for i in there]
+
+
+def _behind(xy: Floats) -> Integers:
+    """Column and row behind the last of some places (n, 2)."""
+    return np.asarray(np.ceil(xy.max(axis=0)).astype(int) + 1)
 
 
 def steadied(placed: PlacedCamera, shake: FrameShake, xy: Floats) -> tuple[Floats, Floats]:
@@ -199,18 +223,6 @@ def _all_steadied(placed: PlacedCamera, shake: FrameShake, places: Sequence[Floa
     xy, added = steadied(placed, shake, np.concatenate(places))
     ends = np.cumsum([len(part) for part in places])[:-1]
     return list(zip(np.split(xy, ends), np.split(added, ends), strict=True))
-
-
-def _steadied_traces(placed: PlacedCamera, shake: FrameShake, traces: tuple[Trace, ...]) -> tuple[Trace, ...]:
-    """Traces where the camera of the jump shows them."""
-    if not traces:
-        return ()
-    places = [*(trace.xy for trace in traces), *(trace.ends for trace in traces)]
-    found = _all_steadied(placed, shake, places)
-    return tuple(
-        replace(trace, xy=xy, ends=ends, common=_common(trace.common, of_axis))
-        for trace, (xy, of_axis), (ends, _) in zip(traces, found[: len(traces)], found[len(traces) :], strict=True)
-    )
 
 
 def _image_measurements(placed: PlacedCamera, shake: FrameShake, image: ImageMeasurements) -> ImageMeasurements:

@@ -1,7 +1,7 @@
 """Finds the candidates of all images of a recording, and looks again where an identification expects something.
 
-What is in front of the static scene is cut out of each image and kept in memory: for the traces of skis, which are
-sought where a jumper is known to be, and for the second look, which is given a predicted place with its covariance and
+What is in front of the static scene is cut out of each image and kept in memory: for skis, which are fitted to grey
+values where a jumper is known to be, and for the second look, which is given a predicted place with its covariance and
 takes weaker evidence there. Pixels that are a signature of the camera
 (`stamped` in the tag) are no picture and are never looked at.
 """
@@ -9,7 +9,6 @@ takes weaker evidence there. Pixels that are a signature of the camera
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from weakref import ref
 
 import numpy as np
 from msgspec import UNSET
@@ -18,13 +17,11 @@ from analysis.candidates.foreground.background import Background, Region
 from analysis.candidates.foreground.pace import Pace
 from analysis.candidates.markers.known_discs import DiscShape, Windows, fit_known_discs, half_size
 from analysis.candidates.markers.spots import MOST, find_expected, find_spots, look_for_spots
-from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots, Trace
-from analysis.candidates.skis.traces import find_expected_traces
-from analysis.candidates.skis.wanted_traces import WantedTraces
+from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots
 from analysis.scene.static_image import StaticImage
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets, triplets
-from rig.arrays import Floats
+from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable
@@ -50,7 +47,6 @@ class Finder:
     def __init__(self, static: Mapping[str, StaticImage], memory: int = _MEMORY) -> None:
         self._backgrounds = {name: Background(image) for name, image in static.items()}
         self._regions: OrderedDict[tuple[PulseNumber, str], list[Region]] = OrderedDict()
-        self._wanted: dict[tuple[PulseNumber, str], ref[WantedTraces]] = {}
         self._paces: dict[str, Pace] = {}
         self._kept, self._memory = 0, memory
 
@@ -69,7 +65,6 @@ class Finder:
         names: list[str] = []
         images: list[list[Region]] = []
         most: list[list[int]] = []
-        traces: list[WantedTraces] = []
         for camera, background, block in self._blocks(tag, image):
             regions = background.regions(block, _stamped(camera))
             still = self._paces.setdefault(camera.name, Pace()).still(tag.time, regions)
@@ -78,16 +73,12 @@ class Finder:
                 most[-1][i] = _FITS_OF_STILL
             names.append(camera.name)
             images.append(regions)
-            traces.append(WantedTraces.of(regions))
-            self._keep(tag.pulse, camera.name, regions, traces[-1])
+            self._keep(tag.pulse, camera.name, regions)
         spots = find_spots(images, most)
-        return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
+        return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots), strict=True)))
 
     def find_expected(self, tag: TripletTag, image: Grey, expected: Mapping[str, Expected]) -> PulseCandidates:
         """The candidates of a pulse near where a jumper is expected: faster than all of them.
-
-        Where the expected skis are not seen, or are not known so nearly that a fit can start from there, traces are
-        sought when they are asked for.
 
         Args:
             tag: of the pulse.
@@ -100,7 +91,6 @@ class Finder:
         names: list[str] = []
         places: list[Expected | None] = []
         images: list[list[Region]] = []
-        traces: list[Sequence[Trace]] = []
         for camera, background, block in self._blocks(tag, image):
             place = expected.get(camera.name)
             box = None if place is None else _inside(place.box, background.shape)
@@ -108,14 +98,9 @@ class Finder:
             names.append(camera.name)
             places.append(place)
             images.append(regions)
-            skis = () if place is None else place.skis
-            near = skis if all(ski.near for ski in skis) else ()
-            known = tuple(trace for region in regions for trace in find_expected_traces(region, near))
-            wanted = None if known else WantedTraces.of(regions, skis)
-            traces.append(known if wanted is None else wanted)
-            self._keep(tag.pulse, camera.name, regions, wanted)
+            self._keep(tag.pulse, camera.name, regions)
         spots = find_expected(images, places)
-        return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots, traces), strict=True)))
+        return PulseCandidates(tag.pulse, tag.time, dict(zip(names, map(ImageCandidates, spots), strict=True)))
 
     def _blocks(self, tag: TripletTag, image: Grey) -> Iterator[tuple[CameraTag, Background, Grey]]:
         """The cameras that delivered, with their static scene and their part of the image."""
@@ -189,21 +174,37 @@ class Finder:
         spots.strength[there] = np.abs(discs.contrast) / discs.sigma_contrast
         return spots
 
-    def _keep(self, pulse: PulseNumber, camera: str, regions: list[Region], traces: WantedTraces | None = None) -> None:
+    def part(self, pulse: PulseNumber, camera: str, low: Integers, high: Integers) -> Region | None:
+        """A part of an image, with the static scene where nothing was in front of it.
+
+        Args:
+            pulse: searched before, not longer ago than the memory reaches.
+            camera: its name.
+            low: first column and row, perhaps outside of the image.
+            high: column and row behind the last ones.
+
+        Returns:
+            What of it lies in the image; None if nothing does, or if the image is not known any more.
+        """
+        regions, background = self._regions.get((pulse, camera)), self._backgrounds.get(camera)
+        if regions is None or background is None:
+            return None
+        part = background.still(low, high)
+        if part is not None:
+            for region in reversed(regions):
+                region.copy_over(part)
+        return part
+
+    def _keep(self, pulse: PulseNumber, camera: str, regions: list[Region]) -> None:
         self._forget((pulse, camera))
         self._regions[pulse, camera] = regions
-        if traces is not None:
-            self._wanted[pulse, camera] = ref(traces)
         self._kept += sum(region.nbytes for region in regions)
         while self._kept > self._memory and len(self._regions) > 1:
             self._forget(next(iter(self._regions)))
 
     def _forget(self, image: tuple[PulseNumber, str]) -> None:
-        """Give the memory of an image back; its traces are found before, if its candidates are still there."""
+        """Give the memory of an image back."""
         self._kept -= sum(region.nbytes for region in self._regions.pop(image, ()))
-        traces = wanted() if (wanted := self._wanted.pop(image, None)) is not None else None
-        if traces is not None:
-            traces.find()
 
 
 def find_candidates(

@@ -1,20 +1,19 @@
-"""What may be a marker or a ski in single images: places with covariance, not yet named.
+"""What may be a marker in single images: places with covariance, not yet named.
 
 Image coordinates are px, pixel frame of `svev-network/1` (x right, y down, (0, 0) = centre of the top-left pixel).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from analysis.candidates.foreground.background import Region
 from analysis.candidates.markers.known_discs import DiscShape
 from rig.arrays import Flags, Floats, Integers
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
-
-EXPECTED_SIGMAS: Final = 3.0  #: of its prediction, by which an expected ski may be off
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,48 +63,14 @@ class Spots:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trace:
-    """A long thin straight thing that may be a ski, or a part of one.
-
-    Attributes:
-        xy: (k, 2) points on its axis, midway between its two edges, from one end to the other, px.
-        sigma: (k,) px, standard deviation of each across the axis; errors of different points are independent.
-        common: px, standard deviation of an error across the axis that all points share.
-        ends: (2, 2) px, where it visibly ends; a body, the other ski or a low contrast may hide more of it.
-        width: px, from edge to edge.
-        contrast: grey values against what is around it; negative: darker.
-        one_sided: (k,) by how much the points move across the axis, to the side (-y, x) of its direction (x, y) from
-            end to end, if half of the width grows by 1: 0 where both edges are seen, -1 or 1 where one is.
-        widening: (k,) by how much half of the width is larger there than `width / 2`, px; NaN where nothing tells.
-        width_spread: standard deviation of the logarithm of `width`.
-        of_width: px, the part of `common` and `lasting` that the uncertainty of the width makes.
-        lasting: px, the part of `common` that neighbouring images share.
-    """
-
-    xy: Floats
-    sigma: Floats
-    common: float
-    ends: Floats
-    width: float
-    contrast: float
-    one_sided: Floats
-    widening: Floats
-    width_spread: float
-    of_width: float
-    lasting: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class ImageCandidates:
     """Candidates of one image.
 
     Attributes:
         spots: that may be markers.
-        traces: that may be skis.
     """
 
     spots: Spots
-    traces: Sequence[Trace]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,28 +89,6 @@ class PulseCandidates:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExpectedSki:
-    """Where an image is expected to show a ski.
-
-    Attributes:
-        ends: (2, 2) ends of its axis, px.
-        width: px, from edge to edge.
-        brighter: than what is behind it.
-        sigma: px, standard deviation of the axis to the side, at its worse end.
-    """
-
-    ends: Floats
-    width: float
-    brighter: bool
-    sigma: float
-
-    @property
-    def near(self) -> bool:
-        """Whether a fit can start from there: it finds a ski that is off by less than its width."""
-        return EXPECTED_SIGMAS * self.sigma < self.width
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Expected:
     """Where an image is expected to show a jumper.
 
@@ -153,13 +96,11 @@ class Expected:
         markers: (n, 2) places of his markers, px.
         reach: (n,) px by which each may be off, with its own size.
         box: (2, 2) smallest and largest column and row (in this order) in which he and his skis may be, px.
-        skis: both; empty if nothing is known of them.
     """
 
     markers: Floats
     reach: Floats
     box: Floats
-    skis: tuple[ExpectedSki, ...] = ()
 
 
 class SecondLook(Protocol):
@@ -167,6 +108,10 @@ class SecondLook(Protocol):
 
     def look_for_spots(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, covariance: Floats) -> list[Spots]:
         """Spots near each predicted place xy (n, 2) with covariance (n, 2, 2), px, on weaker evidence."""
+        ...
+
+    def part(self, pulse: PulseNumber, camera: str, low: Integers, high: Integers) -> Region | None:
+        """A part of an image before the static scene, from its first column and row to behind its last ones."""
         ...
 
     def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:

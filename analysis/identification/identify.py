@@ -5,36 +5,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.candidates.model import PulseCandidates, SecondLook, Trace
-from analysis.candidates.skis.ski_widths import SkiWidth, clear_widths, told_apart
+from analysis.candidates.model import PulseCandidates, SecondLook
 from analysis.identification.markers.markers import BINDINGS, Markers, follow_further, follow_markers
 from analysis.identification.markers.refinement import refined
 from analysis.identification.markers.synchrony import lateness
-from analysis.identification.over_time.assignment import well_known
 from analysis.identification.over_time.flights import Flight, find_flights, find_tracks
 from analysis.identification.over_time.window import Window
-from analysis.identification.skis.ski_traces import StraightTrace, straightened
-from analysis.identification.skis.skis import LONGEST_M, Places, follow_skis
-from analysis.identification.space.body import REACH_M
+from analysis.identification.ski_bars import MeasuredSkis, measure_skis
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
 from analysis.measurements.model import (
     POINTS,
-    SIDES,
     ImageMeasurements,
     JumpMeasurements,
     PointMeasurement,
     PulseMeasurements,
-    SkiMeasurement,
 )
 from analysis.scene.camera_system import CameraSystem
-from rig.arrays import Flags, Floats, Integers
+from rig.arrays import Flags, Integers
 
 _SEARCH_HZ = 30.0  #: tracks are sought in so many pulses per second: displacements that stand out of the noise
 _BEYOND_S = 0.6  #: that markers are followed before the first and after the last point of a track
 _LEAST_NAMES = 2  #: a jumper has more than one point
 _LEAST_PULSES = 3  #: and shows them in more than a glimpse
-_SIGMAS = 3.0  #: of a binding's place, within which skis are sought
 #: Skis turn with up to 30 rad/s^2, by a third of a radian in this time: how they were before says little of them now.
 _SKIS_S = 0.15
 
@@ -150,10 +143,11 @@ class Sighting:
 
         Args:
             look: as of `identify`; what it finds is added to the window.
-            briefly: seek skis only in the last moments (`_SKIS_S`) until the last pulse with a named marker; faster.
+            briefly: with nothing but what the first look found, and with skis only in the last moments (`_SKIS_S`)
+                until the last pulse with a named marker; faster.
         """
         views, window, flight, markers = self.views, self.window, self.flight, self.markers
-        if look is not None:
+        if look is not None and not briefly:
             markers = follow_further(views, window, flight, markers, look)
             markers = refined(views, window, flight, markers, self.appearance, look)
         if not _is_jumper(np.asarray(np.any(markers.assigned.rays >= 0, axis=2))):
@@ -163,14 +157,11 @@ class Sighting:
             numbers, named = np.array([c.pulse for c in window.candidates]), self.pulses()
             steps = (numbers >= named[0]) & (numbers <= named[-1])
             steps &= window.time_s > window.time_s[steps][-1] - _SKIS_S
-        look_for_traces(views, window, markers.places(BINDINGS), steps)
-        _tell_skis_apart(views, window, flight)
-        traces = straight_traces(views, window)
-        skis = follow_skis(views, window, traces, flight, markers.places(BINDINGS))
-        pulses = [
-            named_pulse(views, c, markers.assigned.rays[t], skis.traces[t], traces[t])
-            for t, c in enumerate(window.candidates)
-        ]
+        places = markers.places(BINDINGS)
+        skis: Sequence[MeasuredSkis] = [{}] * len(window)
+        if look is not None:
+            skis = measure_skis(views, window, flight, places, look, steps)
+        pulses = [named_pulse(views, c, markers.assigned.rays[t], skis[t]) for t, c in enumerate(window.candidates)]
         found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
         return tuple(pulses[found[0] : found[-1] + 1])
 
@@ -193,75 +184,14 @@ def _is_jumper(named: Flags) -> bool:
     return bool(np.count_nonzero(named.sum(axis=1) >= _LEAST_NAMES) >= _LEAST_PULSES)
 
 
-def look_for_traces(views: Views, window: Window, bindings: Places, steps: Flags) -> None:
-    """Find the traces of what may be skis in some pulses (t,): nothing else is as near to the bindings.
-
-    Where a binding could be anywhere, none is sought: no trace would be named as its ski.
-    """
-    wanted = steps[:, None] & well_known(bindings.covariance)
-    spread = np.sqrt(np.linalg.eigvalsh(bindings.covariance)[..., -1])
-    reach_m = np.minimum(LONGEST_M + _SIGMAS * spread, REACH_M)
-    for k in range(len(views)):
-        sight = views.see(k, bindings.xyz.reshape(-1, 3))
-        scale = np.linalg.norm(np.nan_to_num(sight.by_point), ord=2, axis=(1, 2))
-        places = sight.xy.reshape(-1, 2, 2) - window.shift[:, k, None]
-        places[~wanted] = np.nan
-        window.look_for_traces(k, places, reach_m * scale.reshape(-1, 2))
-
-
-def _tell_skis_apart(views: Views, window: Window, flight: Flight) -> None:
-    """Learn how wide a ski of this jump is for each camera, and correct the traces of skis that hide each other."""
-    scales: list[Floats] = []
-    near: list[list[list[int]]] = []
-    widths: list[list[float]] = []
-    for k in range(len(views)):
-        sight = views.see(k, flight.place(window.time_s))
-        scales.append(np.asarray(np.linalg.norm(np.nan_to_num(sight.by_point), ord=2, axis=(1, 2))))
-        near.append([])
-        widths.append([])
-        for t, middle in enumerate(sight.xy - window.shift[:, k]):
-            traces, scale = window.traces(t, k), float(scales[k][t])
-            away = [float(np.linalg.norm(trace.ends.mean(axis=0) - middle)) for trace in traces]
-            near[k].append([i for i, distance in enumerate(away) if distance < REACH_M * scale])
-            widths[k] += [px / scale for px in clear_widths([traces[i] for i in near[k][t]])]
-    everywhere = SkiWidth.of([width for of_camera in widths for width in of_camera])
-    for k in range(len(views)):
-        known = SkiWidth.of(widths[k]) or everywhere
-        if known is None:
-            continue
-        for t, own in enumerate(near[k]):
-            if own:
-                traces = window.traces(t, k)
-                told = told_apart([traces[i] for i in own], known.m * float(scales[k][t]), known.spread)
-                window.put_traces(t, k, told + tuple(trace for i, trace in enumerate(traces) if i not in own))
-
-
-def straight_traces(views: Views, window: Window) -> list[list[list[StraightTrace]]]:
-    """The straight traces of each pulse of a window by camera."""
-    return [
-        [
-            straightened(c.images[name].traces, window.shift[t, k]) if name in c.images else []
-            for k, name in enumerate(views.names)
-        ]
-        for t, c in enumerate(window.candidates)
-    ]
-
-
-def named_pulse(
-    views: Views,
-    candidates: PulseCandidates,
-    rays: Integers,
-    skis: Integers,
-    lines: Sequence[Sequence[StraightTrace]],
-) -> PulseMeasurements:
+def named_pulse(views: Views, candidates: PulseCandidates, rays: Integers, skis: MeasuredSkis) -> PulseMeasurements:
     """What was measured in the images of a pulse, by its candidates with their names.
 
     Args:
         views: the cameras.
         candidates: of the pulse.
         rays: (4, m) spot of each marker in each image; -1: none.
-        skis: (2, m) straight trace of each ski in each image; -1: none.
-        lines: straight traces by camera.
+        skis: of the pulse.
     """
     images = {}
     for k, name in enumerate(views.names):
@@ -273,17 +203,5 @@ def named_pulse(
             for i, label in enumerate(POINTS)
             if (s := int(rays[i, k])) >= 0
         }
-        traces = candidates.images[name].traces
-        measured = {
-            side: _ski([traces[part] for part in lines[k][line].parts])
-            for i, side in enumerate(SIDES)
-            if (line := int(skis[i, k])) >= 0
-        }
-        images[name] = ImageMeasurements(points, measured)
+        images[name] = ImageMeasurements(points, skis.get(name, {}))
     return PulseMeasurements(candidates.pulse, candidates.time, images)
-
-
-def _ski(parts: Sequence[Trace]) -> SkiMeasurement:
-    xy, sigma = np.concatenate([part.xy for part in parts]), np.concatenate([part.sigma for part in parts])
-    common, lasting = max(part.common for part in parts), max(part.lasting for part in parts)
-    return SkiMeasurement(xy, sigma, common=common, lasting=lasting)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.candidates.model import PulseCandidates
+from analysis.candidates.model import PulseCandidates, SecondLook
 from analysis.identification.identify import appearance_of, sighted, stride
 from analysis.identification.over_time.flights import Flight, find_flights, find_tracks
 from analysis.identification.over_time.window import Window
@@ -36,7 +36,7 @@ class Seeker:
         self._nobody: list[_Evidence] = []
 
     def seek(
-        self, candidates: Sequence[PulseCandidates], rate_hz: float, more_than: int = 0
+        self, candidates: Sequence[PulseCandidates], rate_hz: float, more_than: int = 0, look: SecondLook | None = None
     ) -> JumpMeasurements | None:
         """The jumper who was seen last in the candidates of the last moments; None if nobody was.
 
@@ -46,6 +46,7 @@ class Seeker:
             candidates: of pulses in order; those of pulses that were given before are the same.
             rate_hz: pulses per second.
             more_than: so many of his markers are known; if no more are named now, his skis are not worth a search.
+            look: at their images, for his skis.
         """
         sought = self._sought(candidates, rate_hz)
         if not sought:
@@ -61,7 +62,7 @@ class Seeker:
             sighting = sighted(self._views, candidates, rate_hz, flight, appearance, on_time=True)
             if more_than and sighting.named() <= more_than:
                 continue
-            if pulses := sighting.measured(None, briefly=True):
+            if pulses := sighting.measured(look, briefly=True):
                 return JumpMeasurements(1, pulses)
             self._nobody.append(evidence)
         return None

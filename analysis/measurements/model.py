@@ -50,7 +50,8 @@ class SkiMeasurement:
         source: who measured it.
         common: px, standard deviation of an error across the ski that all points share (the axis as seen is not that
             of the ski); 0 where there is none.
-        lasting: px, the part of it that neighbouring pulses share; 0 where there is none.
+        lasting: px, standard deviation of what neighbouring pulses share of the shift and of the turn, at the two
+            points that stand for the ski; 0 where there is none.
     """
 
     xy: Floats

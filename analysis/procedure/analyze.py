@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from analysis.cameras.frames import LogFrames
 from analysis.cameras.helmet import with_helmet
@@ -28,6 +29,8 @@ from rig.phrase import phrase, plain
 _NAMED = 6  # pulses that a message names, at most
 #: Told with the step that is done, in words, and the share of it that is done, 0 to 1.
 Progress = Callable[[str, float], None]
+#: Bytes of pixels in front of the static scene that are kept: those of a long jump in large images.
+_MEMORY: Final = 1 << 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +86,7 @@ def look(log: Path, static: Mapping[str, StaticImage], progress: Progress | None
         BadInputError: the log is none, or the images are not as large as the static ones.
     """
     tell = progress or _nobody
-    finder = Finder(static)
+    finder = Finder(static, _MEMORY)
     return SeenLog(static, finder, find_candidates(log, finder, lambda share: tell("looking for the jumper", share)))
 
 

@@ -17,12 +17,14 @@ import numpy as np
 
 from analysis.ski_bars.bars import SKIS, ExpectedBars
 from analysis.ski_bars.model import POSE, SHAPE, SHOVEL_M, BarModel, Predicted, hidden_by_boots
-from analysis.ski_bars.pixels import Pixels
+from analysis.ski_bars.pixels import CELL_PX, Pixels
 from rig.arrays import Flags, Floats
 
 _ALONG_PX, _ACROSS_PX = 10.0, 1.5  # over which errors of the model are alike
-_TOGETHER: Final = 2 * _ALONG_PX * 2 * _ACROSS_PX  # pixels with one error
+_TOGETHER: Final = 2 * _ALONG_PX * 2 * _ACROSS_PX / CELL_PX  # cells with one error
 _MODEL, _LEAST_MODEL = 0.1, 0.02  # m before the residuals tell it, and at least
+#: m from which on something else than skis is in sight there.
+WORST_MODEL: Final = 0.2
 _SHOVEL: Final = 0.3  #: m of the shovel, whose form is not that of the model
 _SIGMAS = 3.0  # residuals that count a quarter
 _MAD_TO_SIGMA = 1.4826
@@ -174,30 +176,40 @@ class BarFit:
         off = np.abs(self.pixels.grey - seen.grey)[near]
         excess = (_MAD_TO_SIGMA * off) ** 2 - self.pixels.noise[near]
         ratio = np.median(excess / np.maximum(self._contrast(x)[near], 1.0) ** 2)
-        return float(np.sqrt(np.clip(ratio, _LEAST_MODEL**2, (2 * _MODEL) ** 2)))
+        return float(np.sqrt(np.clip(ratio, _LEAST_MODEL**2, WORST_MODEL**2)))
 
     def covariance(self, found: Estimate) -> Floats:
         """Covariance of the unknowns: the sandwich of normal equations and covariance of the pixels."""
         x, m = found.x, found.model_error
         seen = self.model.predicted(self.pixels, x)
         fitted = self.fitted(x, seen)
-        normal, middle = self.sandwich(x, seen, seen.by_unknowns, fitted, m)
+        normal, by_noise, by_model = self.sandwich(x, seen, seen.by_unknowns, fitted, m)
         inverse = np.linalg.inv(normal + self.prior)
-        return np.asarray(inverse @ (middle + self.prior) @ inverse)
+        return np.asarray(inverse @ (by_noise + by_model + self.prior) @ inverse)
 
-    def sandwich(self, x: Floats, seen: Predicted, rows: Floats, fitted: Flags, m: float) -> tuple[Floats, Floats]:
-        """Normal equations of the pixels and the covariance of their right side, for derivatives `rows` (n, k)."""
+    def sandwich(
+        self, x: Floats, seen: Predicted, rows: Floats, fitted: Flags, m: float
+    ) -> tuple[Floats, Floats, Floats]:
+        """Normal equations of the pixels, and the covariances of their right side by noise and by errors of the model.
+
+        Args:
+            x: unknowns.
+            seen: at these.
+            rows: (n, k) derivatives.
+            fitted: (n,) pixels that count.
+            m: error of the model in proportion to the contrast.
+        """
         weight = self.weights(x, seen, fitted, m)
         weighted = weight[:, None] * rows
-        middle = weighted.T @ (self.pixels.noise[:, None] * weighted)
+        by_noise, by_model = weighted.T @ (self.pixels.noise[:, None] * weighted), np.zeros((rows.shape[1],) * 2)
         error = np.sqrt(self._model_variance(x, seen, m))[:, None] * weighted
         nearest = np.abs(seen.u).argmin(axis=1)
         for c in range(len(self.model.views)):
             for k in np.flatnonzero(self.model.present).tolist():
                 here = np.flatnonzero((self.pixels.camera == c) & (nearest == k) & (np.abs(error).max(axis=1) > 0))
                 alike = np.exp(-_apart(seen.t[here, k]) / _ALONG_PX - _apart(seen.u[here, k]) / _ACROSS_PX)
-                middle += error[here].T @ (alike @ error[here])
-        return np.asarray(rows.T @ weighted), middle
+                by_model += error[here].T @ (alike @ error[here])
+        return np.asarray(rows.T @ weighted), np.asarray(by_noise), by_model
 
 
 def _apart(place: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.ski_bars.bars import OF_POSE, OF_SHAPE, SKIS, ExpectedBars, Poses
-from analysis.ski_bars.estimate import BarFit, Estimate
+from analysis.ski_bars.estimate import WORST_MODEL, BarFit, Estimate
 from analysis.ski_bars.image_lines import REDUNDANCY, ImageLine, image_lines
 from analysis.ski_bars.model import POSE, SHAPE, BarModel
 from analysis.ski_bars.pixels import SkiView, pixels_around
@@ -18,6 +18,8 @@ _EXPLAINED: Final = 0.7  #: of the differences from the static scene along a ski
 _VISIBLE: Final = 0.6  #: of the pixels of a ski, at least
 _WORST_PX: Final = 1.0  #: sigma of a line across it, at most
 _CONTRADICTION: Final = float(chdtri(REDUNDANCY, 1e-4))  #: one sound image in ten thousand contradicts the others more
+#: With width and brightness: noise alone gives more in one image of a million.
+_EVIDENCE: Final = float(chdtri(REDUNDANCY + 2, 1e-6))
 _FEWEST: Final = 2  #: images that show a ski
 _STARTS: Final = 12  # of each ski, beside the expected place
 _REACH_SIGMAS, _WIDEST_M = 2.0, 0.15  # beside and beyond the expected skis, that are looked at
@@ -48,24 +50,27 @@ class FittedBars:
     distance: float
 
 
-def fit_bars(views: Sequence[SkiView], expected: ExpectedBars, present: tuple[bool, bool] = (True, True)) -> FittedBars:
+def fit_bars(
+    views: Sequence[SkiView], expected: ExpectedBars, present: tuple[bool, bool] = (True, True), *, near: bool = False
+) -> FittedBars:
     """Fit a pair of skis.
 
     Args:
         views: images of one pulse.
         expected: where the skis should be, and how they are shaped.
         present: which of both there are; the other one is left as it is expected.
+        near: they are expected so nearly that a fit can start from there; no other places and ends are tried.
     """
     wide = min(_WIDEST_M, _REACH_SIGMAS * float(np.sqrt(np.diagonal(expected.covariance)[[2, 7]].max())))
     ends = expected.shape[:, 1:] + _REACH_SIGMAS * expected.shape_sigma[:, 1:] * (-1, 1)
     pixels = pixels_around(views, expected.poses, ends, wide)
     fit = BarFit(BarModel(views, expected.poses, present), pixels, expected)
     found = fit.solved(fit.start(np.zeros(POSE.stop)))
-    if expected.shape_sigma[:, 1:].max() > _UNSURE_END_M:
+    if not near and expected.shape_sigma[:, 1:].max() > _UNSURE_END_M:
         found = fit.solved(_with_ends(fit, found.x))
     lines = image_lines(fit, found)
     good = _good(lines)
-    if (good.sum(axis=0) < np.where(present, _FEWEST, 0)).any():
+    if not near and (good.sum(axis=0) < np.where(present, _FEWEST, 0)).any():
         tried = fit.solved(_other_start(fit, expected))
         if tried.cost < found.cost:
             found, lines = tried, image_lines(fit, tried)
@@ -75,12 +80,14 @@ def fit_bars(views: Sequence[SkiView], expected: ExpectedBars, present: tuple[bo
 
 def _judged(fit: BarFit, found: Estimate, good: Flags, lines: list[list[ImageLine | None]]) -> FittedBars:
     """Without what was refused, fitted once more."""
+    if found.model_error >= WORST_MODEL:
+        good[:] = False
     if (good != fit.used).any():
         fit.used = good & (good.sum(axis=0) >= _FEWEST)
         if fit.used.any():
             found = fit.solved(found.x)
             lines = image_lines(fit, found)
-            good = _good(lines)
+            good = _good(lines) & (found.model_error < WORST_MODEL)
             fit.used = good & (good.sum(axis=0) >= _FEWEST)
     kept = {
         view.camera.name: [line if fit.used[c, k] else None for k, line in enumerate(lines[c])]
@@ -108,6 +115,7 @@ def _good(lines: list[list[ImageLine | None]]) -> Flags:
                 line is not None
                 and line.explained > _EXPLAINED
                 and line.visible > _VISIBLE
+                and line.evidence > _EVIDENCE
                 and line.sigma < _WORST_PX
                 and line.contradiction < _CONTRADICTION
                 for line in of

@@ -31,19 +31,23 @@ class ImageLine:
     Attributes:
         xy: (2, 2) px, two points of the line that fits its axis best; their errors are independent.
         sigma: standard deviation of each across the line, px.
+        lasting: px, the part of a shift and of a turn that errors of the model make: they are alike in the next images.
         binding: (2,) px, where the binding is on the axis.
         binding_covariance: (2, 2) px^2.
         explained: share of the differences from the static scene along the ski that the model explains.
         visible: share of the ski's pixels that nothing else hides.
+        evidence: by how much the ski makes the sum of the squares of residuals over noise smaller.
         contradiction: chi-squared of what the image says by itself against all images, redundancy `REDUNDANCY`.
     """
 
     xy: Floats
     sigma: float
+    lasting: float
     binding: Floats
     binding_covariance: Floats
     explained: float
     visible: float
+    evidence: float
     contradiction: float
 
 
@@ -71,10 +75,11 @@ def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
         own = np.tile((_WIDE_PX, _WIDE_RAD, _WIDE_PX), SKIS) ** -2.0
         prior[: len(own), : len(own)] = np.diag(own)
         prior[len(own) :, len(own) :] = fit.prior[np.ix_(of_image, of_image)]
-        normal, middle = fit.sandwich(x, seen, rows, here, m)
+        normal, by_noise, middle = fit.sandwich(x, seen, rows, here, m)
         inverse = np.linalg.inv(normal + prior)
+        by_model = inverse @ middle @ inverse
         step = inverse @ (rows.T @ (weight * off))
-        covariance = inverse @ (middle + prior) @ inverse
+        covariance = inverse @ (by_noise + prior) @ inverse + by_model
         of: list[ImageLine | None] = []
         for k in range(SKIS):
             near = here & (np.abs(seen.u[:, k]) < seen.half[:, k] + _BESIDE_PX)
@@ -84,17 +89,22 @@ def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
                 continue
             mine = slice(REDUNDANCY * k, REDUNDANCY * (k + 1))
             believed = robust[near]
-            without = float((believed * (fit.pixels.grey - fit.pixels.behind)[near] ** 2).sum())
-            explained = 1 - float((believed * off[near] ** 2).sum()) / max(without, 1e-9)
+            noise = float((believed * fit.pixels.noise[near]).sum())
+            front = (fit.pixels.grey - fit.pixels.behind)[near] ** 2
+            without, unexplained = (float((believed * square).sum()) - noise for square in (front, off[near] ** 2))
+            explained = 1 - max(unexplained, 0.0) / without if without > 0 else 0.0
+            evidence = float((believed * (front - off[near] ** 2) / fit.pixels.noise[near]).sum())
             visible = float(np.sqrt(believed).mean())
-            of.append(_line(view, poses, k, step[mine], covariance[mine, mine], (explained, visible)))
+            spread = covariance[mine, mine], by_model[mine, mine]
+            of.append(_line(view, poses, k, step[mine], spread, (explained, visible, evidence)))
         lines.append(of)
     return lines
 
 
 def _line(
-    view: SkiView, poses: Poses, k: int, step: Floats, covariance: Floats, shares: tuple[float, float]
+    view: SkiView, poses: Poses, k: int, step: Floats, spread: tuple[Floats, Floats], shares: tuple[float, float, float]
 ) -> ImageLine:
+    covariance, by_model = spread
     s = np.concatenate((_S, [0.0]))
     px = view.camera.project(poses.point[k] + s[:, None] * poses.direction[k] + view.shift)
     chord = (px[-2] - px[0]) / np.hypot(*(px[-2] - px[0]))
@@ -111,6 +121,7 @@ def _line(
     return ImageLine(
         on_axis + (step[0] + step[1] * places)[:, None] * across,
         float(np.sqrt(2 * shift_variance)),
+        float(np.sqrt(by_model[0, 0] + middle * (2 * by_model[0, 1] + middle * by_model[1, 1]))),
         px[-1] + axes @ step[[0, 2]],
         axes @ shift @ axes.T,
         *shares,

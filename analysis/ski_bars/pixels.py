@@ -1,19 +1,21 @@
 """The pixels of all cameras that say something about a pair of skis."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import cv2
 import numpy as np
 
-from analysis.candidates.foreground.background import Background, Region
+from analysis.candidates.foreground.background import Region
 from analysis.scene.camera_system import PlacedCamera
 from analysis.ski_bars.bars import SKIS, Poses
 from rig.arrays import Flags, Floats, Integers
-from rig.images.picture import Grey
 
 #: Px beside and beyond a ski that are looked at.
 REACH_PX: Final = 4.0
+#: Px along a ski that are taken together: the errors of the model are alike over more.
+CELL_PX: Final = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,19 +47,18 @@ class SkiView:
 
     Attributes:
         camera: oriented.
-        image: (rows, columns).
-        background: the static scene.
+        part: of the image, before the static scene, from its first column and row to behind its last ones; None where
+            the image does not reach.
         shift: (3,) how much farther the skis were when it saw them than at the instant of the result, m.
     """
 
     camera: PlacedCamera
-    image: Grey
-    background: Background
+    part: Callable[[Integers, Integers], Region | None]
     shift: Floats
 
 
 def pixels_around(views: Sequence[SkiView], poses: Poses, ends: Floats, reach_m: float) -> Pixels:
-    """The pixels around both skis.
+    """The pixels around both skis, `CELL_PX` of them along a ski as one; each counts with the ski that is nearer.
 
     Args:
         views: images of one pulse.
@@ -65,7 +66,7 @@ def pixels_around(views: Sequence[SkiView], poses: Poses, ends: Floats, reach_m:
         ends: (2, 2) from where to where they reach, m from the binding.
         reach_m: how far beside that they may be, m.
     """
-    parts: dict[str, list[Floats]] = {name: [] for name in ("camera", "xy", "grey", "behind", "noise")}
+    parts = []
     for c, view in enumerate(views):
         places = poses.point[:, None] + ends[..., None] * poses.direction[:, None] + view.shift
         px = view.camera.project(places)
@@ -73,28 +74,37 @@ def pixels_around(views: Sequence[SkiView], poses: Poses, ends: Floats, reach_m:
             continue
         scale = float(view.camera.camera.interior[0] / np.linalg.norm(poses.point.mean(axis=0) - view.camera.position))
         reach = REACH_PX + reach_m * scale
-        low = np.maximum(np.floor(px.min(axis=(0, 1)) - reach), 0).astype(int)
-        high = np.minimum(np.ceil(px.max(axis=(0, 1)) + reach) + 1, view.camera.size).astype(int)
-        if (high - low <= 1).any():
-            continue
-        region = view.background.part(view.image, (int(low[0]), int(low[1]), int(high[0]), int(high[1])))
-        xy = _places(region)
-        near = np.zeros(len(xy), bool)
-        for k in range(SKIS):
-            near |= _distance(xy, px[k]) < reach
-        parts["camera"].append(np.full(int(near.sum()), c))
-        parts["xy"].append(xy[near])
-        for name, layer in (("grey", region.grey), ("behind", region.behind), ("noise", region.sigma**2)):
-            parts[name].append(layer.ravel()[near].astype(float))
-    joined: Mapping[str, Floats] = {
-        name: np.concatenate(part) if part else np.zeros((0, 2) if name == "xy" else 0) for name, part in parts.items()
-    }
-    return Pixels(joined["camera"].astype(np.intp), *(joined[name] for name in ("xy", "grey", "behind", "noise")))
+        low = np.floor(px.min(axis=(0, 1)) - reach).astype(int)
+        region = view.part(low, np.ceil(px.max(axis=(0, 1)) + reach).astype(int) + 1)
+        if region is not None:
+            parts += [cells for k in range(SKIS) if len((cells := _cells(region, px, k, reach, c))[0])]
+    if not parts:
+        return Pixels(np.zeros(0, np.intp), np.zeros((0, 2)), *np.zeros((3, 0)))
+    camera, xy, grey, behind, noise = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return Pixels(camera.astype(np.intp), xy, grey, behind, noise)
 
 
-def _places(region: Region) -> Floats:
-    y, x = np.mgrid[: region.grey.shape[0], : region.grey.shape[1]]
-    return np.column_stack((x.ravel() + region.x, y.ravel() + region.y)).astype(float)
+def _cells(region: Region, px: Floats, k: int, reach: float, camera: int) -> tuple[Floats, ...]:
+    """Camera, places, grey values, scene and noise of the cells of ski k, whose ends are at px (2, 2, 2)."""
+    way = px[k, 1] - px[k, 0]
+    length = float(np.hypot(*way))
+    along = way / max(length, 1e-9)
+    t = np.arange(-reach, length + reach, CELL_PX) + (CELL_PX - 1) / 2
+    u = np.arange(-np.floor(reach), np.floor(reach) + 1)
+    xy = (px[k, 0] + t[:, None, None] * along + u[:, None] * np.array((-along[1], along[0]))).reshape(-1, 2)
+    last = np.array(region.grey.shape[::-1]) - 1
+    within = xy - (region.x, region.y)
+    xy = xy[((within >= 1) & (within <= last - 1)).all(axis=1) & (_distance(xy, px[k]) <= _distance(xy, px[1 - k]))]
+    if not len(xy):
+        return np.zeros(0), xy, *np.zeros((3, 0))
+    steps = np.arange(CELL_PX) - (CELL_PX - 1) / 2
+    each = (xy[:, None] + steps[:, None] * along - (region.x, region.y)).astype(np.float32)
+    grey, behind, sigma = (
+        cv2.remap(layer, each[..., 0], each[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).mean(axis=1)
+        for layer in (region.grey, region.behind, region.sigma)
+    )
+    noise = sigma.astype(float) ** 2 / CELL_PX
+    return np.full(len(xy), camera), xy, grey.astype(float), behind.astype(float), noise
 
 
 def _distance(xy: Floats, ends: Floats) -> Floats:

@@ -11,15 +11,15 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from analysis.candidates.model import Expected, PulseCandidates
-from analysis.identification.identify import look_for_traces, named_pulse, straight_traces
+from analysis.candidates.model import Expected, PulseCandidates, SecondLook
+from analysis.identification.identify import named_pulse
 from analysis.identification.markers.markers import BINDINGS, Markers
 from analysis.identification.over_time.assignment import MOST_VAGUE_M, assign, well_known
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Prediction
 from analysis.identification.over_time.window import Window
 from analysis.identification.seeking import Seeker
-from analysis.identification.skis.skis import assign_skis
+from analysis.identification.ski_bars import MeasuredSkis, ski_views
 from analysis.identification.space.body import REACH_M
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
@@ -28,7 +28,7 @@ from analysis.motion.causal import CausalFilter
 from analysis.procedure.names import measured_parts, told_names, told_state
 from analysis.result.model import JumperState, SmoothedState, Status
 from analysis.scene.camera_system import CameraSystem
-from analysis.worker.ski_images import SkiImages
+from analysis.worker.followed_skis import FollowedSkis
 from rig.arrays import Flags, Floats
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
@@ -73,7 +73,7 @@ class Follower:
     def __init__(self, system: CameraSystem, cameras: Mapping[str, MeasuredCamera], rate_hz: float) -> None:
         self._views = Views(system, {name: camera.exposure_s for name, camera in cameras.items()})
         self._filter = CausalFilter(system, cameras, rate_hz)
-        self._skis = SkiImages(len(self._views))
+        self._skis = FollowedSkis()
         self._rate_hz = rate_hz
         self._appearance: Appearance | None = None
         self._next: tuple[UtcNs, tuple[SmoothedState, SmoothedState]] | None = None
@@ -84,23 +84,26 @@ class Follower:
         self._told = frozenset[str]()
         self.first = self.last = PulseNumber(0)
 
-    def find(self, seeker: Seeker, candidates: Sequence[PulseCandidates], more_than: int = 0) -> list[Followed]:
+    def find(
+        self, seeker: Seeker, candidates: Sequence[PulseCandidates], more_than: int = 0, look: SecondLook | None = None
+    ) -> list[Followed]:
         """Begin with who is found in the candidates of the last moments.
 
         Args:
             seeker: of the recording.
             candidates: of these moments.
             more_than: so many of his markers are known: nobody is found who does not show more.
+            look: at their images, for his skis.
 
         Returns:
             His states up to the last candidates; none if nobody is found.
         """
-        found = seeker.seek(candidates, self._rate_hz, more_than)
+        found = seeker.seek(candidates, self._rate_hz, more_than, look)
         if found is None or len(found.pulses) < _BEGIN:
             return []
         states = self.begin(found, candidates)
         if states:
-            states += [self.follow(later) for later in candidates if later.pulse > found.pulses[-1].pulse]
+            states += [self.follow(later, look) for later in candidates if later.pulse > found.pulses[-1].pulse]
         return states
 
     def begin(self, found: JumpMeasurements, candidates: Sequence[PulseCandidates]) -> list[Followed]:
@@ -128,24 +131,24 @@ class Follower:
         _, state = self._predicted(time)
         xyz = np.array([_known(point).xyz for point in state.points.values()])
         covariance = np.array([_known(point).covariance for point in state.points.values()])
-        places = np.concatenate((xyz, state.origin.value[None], self._skis.places(state)))
+        places = np.concatenate((xyz, state.origin.value[None]))
         radius = 0.0 if self._appearance is None else self._appearance.radius
         found = {}
         moved = state.velocity.value * self._views.late_s[:, None, None]
         for k, whole in enumerate(self._views.see_all(places + moved)):
             name, scale = self._views.names[k], float(self._views.scale[k])
-            sight, of_skis = whole.only(slice(len(xyz))), whole.only(slice(len(xyz) + 1, None))
+            sight = whole.only(slice(len(xyz)))
             spread = sight.by_point @ covariance @ sight.by_point.swapaxes(-1, -2) + sight.noise
             sigma = np.sqrt(np.linalg.eigvalsh(np.nan_to_num(spread, nan=1e6))[:, -1])
             reach = _SIGMAS * sigma + _RADII * radius * scale
             middle, half = whole.xy[len(xyz)], REACH_M * scale
             if np.isfinite(sight.xy).all() and np.isfinite(middle).all():
                 box = np.stack((middle - half, middle + half))
-                found[name] = Expected(sight.xy, reach, box, self._skis.expected(k, state, of_skis))
+                found[name] = Expected(sight.xy, reach, box)
         return found
 
-    def follow(self, candidates: PulseCandidates) -> Followed:
-        """Measure him at the next pulse."""
+    def follow(self, candidates: PulseCandidates, look: SecondLook | None = None) -> Followed:
+        """Measure him at the next pulse, whose images are looked at for his skis."""
         views = self._views
         state, _ = self._predicted(candidates.time)
         flight = _flight(state, candidates.pulse / self._rate_hz)
@@ -154,20 +157,14 @@ class Follower:
         places = Prediction(np.array([[p.xyz for p in points]]), np.array([[p.covariance for p in points]]))
         assigned = assign(views, window, places, flight.axes)
         bindings = Markers(assigned, places).places(BINDINGS)
-        look_for_traces(views, window, bindings, np.ones(1, bool))
-        for k in range(len(views)):
-            if traces := window.traces(0, k):
-                window.put_traces(0, k, self._skis.told_apart(k, tuple(traces)))
-        lines = straight_traces(views, window)
-        skis = assign_skis(views, lines, window.delivered, flight, bindings, _angles(state, flight))
-        measured = named_pulse(views, window.candidates[0], assigned.rays[0], skis[0], lines[0])
+        skis: MeasuredSkis = {}
+        if look is not None:
+            images = ski_views(views, window, flight, 0, look)
+            skis = self._skis.measured(images, bindings.at(0), _angles(state, flight), flight.axes)
+        measured = named_pulse(views, window.candidates[0], assigned.rays[0], skis)
         found = self._filter.update(measured)
         if found is None:
             raise AssertionError("the filter has begun")
-        for k in range(len(views)):
-            own = {i: lines[0][k][int(line)].parts for i, line in enumerate(skis[0, :, k]) if line >= 0}
-            traces = window.traces(0, k)
-            self._skis.learn(k, {i: [traces[part] for part in parts] for i, parts in own.items()})
         if any(part is not None and part.status is not Status.PREDICTED for part in found.points.values()):
             self.last = candidates.pulse
         self._pulse, self._time, self._latest = candidates.pulse, candidates.time, found
@@ -196,7 +193,6 @@ class Follower:
     def continue_from(self, other: "Follower") -> None:
         """Go on in place of another one, who has followed the same jumper."""
         self.first = other.first
-        self._skis.continue_from(other._skis)
 
     def knows_more_than(self, other: "Follower") -> bool:
         """Whether this is the jumper whom another one follows, after the same pulse, with more of his markers.

@@ -24,7 +24,7 @@ from analysis.cameras.source import orient_from, read_source
 from analysis.cameras.standing import Standing
 from analysis.cameras.steadiness import standing_in
 from analysis.candidates.finder import Finder
-from analysis.candidates.model import PulseCandidates
+from analysis.candidates.model import PulseCandidates, SecondLook
 from analysis.export.scene_update import camera_frames, scene_update
 from analysis.identification.seeking import Seeker
 from analysis.measurements.model import POINTS
@@ -181,7 +181,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             self._keep(recording, finder.find(tag, image), frames)
         else:
             self._keep(recording, finder.find_expected(tag, image, follower.expected(tag.time)), frames)
-            self._tell(recording, follower.follow(recording.candidates[-1]))
+            self._tell(recording, follower.follow(recording.candidates[-1], self._look(recording)))
             recording.saw(follower)
             if follower.look_is_due():
                 self._seek_hidden(recording, follower)
@@ -250,7 +250,7 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             recording.seeker = Seeker(system, exposures)
         follower = Follower(system, cameras, rate)
         recent = recording.between(max(newest - _SOUGHT_S * rate, first), newest)
-        return follower, follower.find(recording.seeker, recent, more_than)
+        return follower, follower.find(recording.seeker, recent, more_than, self._look(recording))
 
     def _tell(self, recording: Streamed, followed: Followed) -> None:
         """Tell a state."""
@@ -282,10 +282,17 @@ class LiveAnalysis(AbstractContextManager["LiveAnalysis"]):
             recording.cameras(self._exposures),
             tuple(recording.between(max(seen[0] - around, recording.done + 1), seen[1] + around)),
             scene,
-            Standing(scene.system, {name: dict(of) for name, of in recording.shake.items()}).look(finder),
+            self._look(recording),
         )
         recording.done = seen[1]
         self._computing.append(self._thread.submit(task.computed))
+
+    def _look(self, recording: Streamed) -> SecondLook:
+        """Looks at the images of a recording."""
+        if self._scene is None or self._finder is None:
+            raise RuntimeError("the cameras are oriented before anything is looked at")
+        shake = {name: dict(of) for name, of in recording.shake.items()}
+        return Standing(self._scene.system, shake).look(self._finder)
 
     def _refuse(self, error: BadInputError) -> None:
         """Nobody is followed any more with a survey that a flight has proved wrong; that is said once."""

@@ -85,6 +85,19 @@ class Region:
         there = slice(own[0].start - y, own[0].stop - y), slice(own[1].start - x, own[1].stop - x)
         grey[there], noise[there] = self.grey[own], self.noise[own]
 
+    def copy_over(self, other: "Region") -> None:
+        """Copy what lies in another region into it."""
+        rows, columns = self.grey.shape
+        low = np.maximum((self.x, self.y), (other.x, other.y))
+        high = np.minimum((self.x + columns, self.y + rows), np.add((other.x, other.y), other.grey.shape[::-1]))
+        if (low >= high).any():
+            return
+        (own, there) = (
+            (slice(low[1] - of.y, high[1] - of.y), slice(low[0] - of.x, high[0] - of.x)) for of in (self, other)
+        )
+        for name in ("grey", "behind", "sigma", "noise", "front"):
+            getattr(other, name)[there] = getattr(self, name)[own]
+
 
 class Background:
     """The static scene of one camera, to compare its images with.
@@ -101,6 +114,7 @@ class Background:
         self._shift = np.float32(_SHIFT_SIGMA**2) * (self._right**2 + self._down**2)
         noise = np.maximum(np.asarray(static.noise, np.float32), np.sqrt(_ROUNDING))
         ratio = noise / _usual(grey, noise)
+        self._variance = np.float32(np.median(noise) ** 2)
         self._ratio = np.where(ratio > _RESTLESS, ratio**2, np.float32(1))
         step = max(1, int(np.sqrt(grey.size / _SAMPLES)))
         self._grid = slice(step // 2, None, step), slice(step // 2, None, step)
@@ -148,19 +162,40 @@ class Background:
         looked_at = (left, first, right, last)
         return [self._region(image, moment, front, box) for box in _boxes(front, looked_at)]
 
-    def part(self, image: Grey, box: tuple[int, int, int, int]) -> Region:
+    def still(self, low: Integers, high: Integers) -> Region | None:
+        """A part of the static scene itself, as `part` gives it where nothing is in front."""
+        box = self._inside(low, high)
+        if box is None:
+            return None
+        part = slice(box[1], box[3]), slice(box[0], box[2])
+        grey, sigma = self._grey[part], np.sqrt(self._variance * self._ratio[part] + self._shift[part])
+        return Region(box[0], box[1], grey.copy(), grey.copy(), sigma, sigma.copy(), np.zeros(grey.shape, bool))
+
+    def part(self, image: Grey, low: Integers, high: Integers) -> Region | None:
         """A part of an image, whether anything is in front there or not.
 
         Args:
             image: (rows, columns) of this camera.
-            box: column and row of the first and behind the last pixel.
+            low: first column and row, perhaps outside of the image.
+            high: column and row behind the last ones.
+
+        Returns:
+            What of it lies in the image; None if nothing does.
         """
+        box = self._inside(low, high)
+        if box is None:
+            return None
         moment = self._moment(image)
         front = np.zeros(image.shape, np.uint8)
         where = slice(box[1], box[3]), slice(box[0], box[2])
         behind, variance = self._expected(where, moment)
         front[where] = (image[where].astype(np.float32) - behind) ** 2 > variance * np.float32(_FRONT**2)
         return self._region(image, moment, front, box)
+
+    def _inside(self, low: Integers, high: Integers) -> tuple[int, int, int, int] | None:
+        left, top = np.maximum(low, 0).tolist()
+        right, bottom = np.minimum(high, self.shape[::-1]).tolist()
+        return (left, top, right, bottom) if right - left > 1 and bottom - top > 1 else None
 
     def _region(
         self, image: Grey, moment: "_Moment", front: NDArray[np.uint8], box: tuple[int, int, int, int]

@@ -6,8 +6,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from analysis.candidates.skis.bar_model import MODEL
 from analysis.digitizing.refining.fit_judgement import (
+    MODEL,
     NEAR_PX,
     NOISE,
     TRIED,

@@ -6,9 +6,9 @@ from typing import Final
 import cv2
 import numpy as np
 
-from analysis.candidates.skis.bar_model import MODEL
 from analysis.digitizing.refining.edge_profiles import REACH_PX, Borders, Strip, fit_borders, strip
 from analysis.digitizing.refining.fit_judgement import (
+    MODEL,
     NEAR_PX,
     NOISE,
     inside,

@@ -14,6 +14,7 @@ from rig.phrase import Phrase, phrase
 REFUSED_P: Final = 1e-4  #: probability of a worse fit, or of so much contrast by noise, at which a fit is refused
 NEAR_PX: Final = 4.0  #: a click may be so far off
 TRIED: Final = 6  #: starts of a fit
+MODEL: Final = 0.03  #: of the contrast: residuals that a model itself leaves
 _TRIALS = 100  # fits of which one by chance may be good: places and sizes that a search tries
 _NOISE_REACH = 40.0  # px around a click in which the noise of the image is estimated
 

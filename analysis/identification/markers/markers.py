@@ -15,7 +15,7 @@ from analysis.identification.over_time.assignment import Assigned, assign, well_
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Part, PathFilter, Prediction, predict
 from analysis.identification.over_time.window import Window
-from analysis.identification.skis.skis import Places
+from analysis.identification.ski_bars import Bindings
 from analysis.identification.space.body import USUAL, implausibility
 from analysis.identification.space.space_points import SpacePoints
 from analysis.identification.space.views import Views
@@ -56,7 +56,7 @@ class Markers:
     assigned: Assigned
     predicted: Prediction
 
-    def places(self, markers: Sequence[int]) -> Places:
+    def places(self, markers: Sequence[int]) -> Bindings:
         """Places of some markers by all pulses, this one too."""
         which = list(markers)
         inverse = np.linalg.inv(self.predicted.covariance[:, which])
@@ -66,7 +66,7 @@ class Markers:
         measured[~seen] = 0.0
         right += measured @ np.nan_to_num(self.assigned.xyz[:, which])[..., None]
         covariance = np.asarray(np.linalg.inv(inverse + measured), float)
-        return Places((covariance @ right)[..., 0], covariance)
+        return Bindings((covariance @ right)[..., 0], covariance)
 
 
 def follow_markers(views: Views, window: Window, flight: Flight) -> Markers:

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots, Trace
-from analysis.candidates.skis.wanted_traces import WantedTraces
+from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.space.body import REACH_M
 from analysis.identification.space.space_points import Appearance, Rays, find_space_points, rays_of
@@ -27,6 +26,7 @@ class Window:
         rays: their spots, of each pulse by camera.
         points: in space, that these spots may show.
         delivered: (t, m) whether a camera has an image of a pulse.
+        late_s: (m,) how much later than the mean of all cameras each one shows the jumper.
         shift: (t, m, 2) px, what takes the jumper in an image back to the time that all cameras share.
     """
 
@@ -52,7 +52,7 @@ class Window:
         self._views, self._appearance, self._flight, self._rate_hz = views, appearance, flight, rate_hz
         self.candidates = list(candidates)
         self.time_s: Floats = np.array([float(c.pulse) for c in candidates]) / rate_hz
-        late = views.late_s if late_s is None else views.late_s + late_s
+        self.late_s = late = views.late_s if late_s is None else views.late_s + late_s
         self.shift = np.zeros((len(candidates), len(views), 2))
         self._path = np.full(self.shift.shape, np.nan)
         if flight is not None:
@@ -103,31 +103,7 @@ class Window:
     def put(self, t: int, k: int, spots: Spots) -> None:
         """Replace the spots of an image; `renew` makes rays and points of them."""
         name = self._views.names[k]
-        image = self.candidates[t].images[name]
-        images = {**self.candidates[t].images, name: ImageCandidates(spots, image.traces)}
-        self.candidates[t] = replace(self.candidates[t], images=images)
-
-    def look_for_traces(self, k: int, places: Floats, reach: Floats) -> None:
-        """Find the traces in the images of a camera near some places, where they have not been sought before.
-
-        Args:
-            k: number of the camera.
-            places: (t, n, 2) px, in each image; NaN: nowhere.
-            reach: (t, n) px around each; what lies further away is left out.
-        """
-        for t in range(len(self)):
-            if isinstance(wanted := self.traces(t, k), WantedTraces):
-                self.put_traces(t, k, wanted.near(places[t], reach[t]))
-
-    def traces(self, t: int, k: int) -> Sequence[Trace]:
-        """The traces of an image; none where it is missing."""
-        image = self.candidates[t].images.get(self._views.names[k])
-        return () if image is None else image.traces
-
-    def put_traces(self, t: int, k: int, traces: Sequence[Trace]) -> None:
-        """Replace the traces of an image."""
-        name = self._views.names[k]
-        images = {**self.candidates[t].images, name: replace(self.candidates[t].images[name], traces=traces)}
+        images = {**self.candidates[t].images, name: ImageCandidates(spots)}
         self.candidates[t] = replace(self.candidates[t], images=images)
 
     def renew(self, order: Sequence[int]) -> None:

@@ -18,7 +18,6 @@ from typing import Final
 
 import numpy as np
 
-from analysis.candidates.skis.ski_fit import AXIS_PX
 from analysis.measurements.model import POINTS
 from analysis.motion.adjustment.bundle import Adjusted, rows_by_shared
 from analysis.motion.adjustment.lasting_variances import Residuals, covariance_of, variances_of
@@ -31,9 +30,11 @@ LASTING_S: Final = 0.2
 _RUN_S: Final = LASTING_S / 2  # in so short a time a lasting error is one number
 _POINTS, _SKIS = range(len(POINTS)), range(len(POINTS), len(GROUPS))
 #: Variances of lasting errors before a jump tells them: of points in those of single ones; of the axes of skis besides
-#: `AXIS_PX` a factor for what their images tell. Half of each fades, half stays.
+#: `_AXIS_PX` a factor for what their images tell. Half of each fades, half stays.
 _OF_POINTS: Final = (0.01, 0.01)
 _TOLD: Final = 1.0
+#: Standard deviation of the axis of a ski in an image, px, which its images never tell.
+_AXIS_PX: Final = 0.015
 _GAP_S, _GAP_PULSES = 0.05, 1.5  # behind a longer gap it may be another error
 
 
@@ -134,8 +135,8 @@ def lasting_covariance(adjusted: Adjusted, square: Floats, redundancy: Floats) -
     """
     b = len(adjusted.shared)
     total = Added(np.zeros((len(adjusted.used), STATE, STATE)), np.zeros((b, b)))
-    shift, turn = AXIS_PX**2 * adjusted.model.observed.factors[_SKIS.start] ** 2
-    for things, start in ((_POINTS, _OF_POINTS), (_SKIS, (shift, turn, _TOLD))):
+    shift, turn = _AXIS_PX**2 * adjusted.model.observed.factors[_SKIS.start] ** 2
+    for things, start in ((_POINTS, _OF_POINTS), (_SKIS, (shift, turn, _TOLD, _TOLD))):
         series = [
             own
             for camera in range(adjusted.used.shape[1])
@@ -190,7 +191,7 @@ def _alike(adjusted: Adjusted, own: list[Run]) -> Floats:
 def _shapes(adjusted: Adjusted, own: list[Run]) -> list[Floats]:
     """Errors of the measurements of each run of one camera and one thing.
 
-    Of a point (k, 2, 2) two as large as its sigmas; of a ski (k, 2, 3) a shift and a turn of a px, and a shift as large
+    Of a point (k, 2, 2) two as large as its sigmas; of a ski (k, 2, 4) a shift and a turn of a px, and both as large
     as its images tell.
     """
     observed, camera, group = adjusted.model.observed, own[0].camera, own[0].group
@@ -199,7 +200,8 @@ def _shapes(adjusted: Adjusted, own: list[Run]) -> list[Floats]:
     pulses = np.concatenate([run.pulses for run in own])
     turn, told = _same_way(observed.xy[pulses, camera, group]), observed.lasting[pulses, camera, group]
     shift = np.ones_like(turn)
-    shapes = np.stack((np.stack((shift, -turn, told), axis=-1), np.stack((shift, turn, told), axis=-1)), axis=1)
+    before, behind = (np.stack((shift, way * turn, told, way * turn * told), axis=-1) for way in (-1, 1))
+    shapes = np.stack((before, behind), axis=1)
     return np.split(shapes, np.cumsum([len(run.pulses) for run in own])[:-1])
 
 

@@ -45,7 +45,8 @@ class Observations:
         whitener: (n, m, 6, 2, 2): root of the weight matrix of a group's two observations.
         seen: (n, m, 6) which groups were measured.
         by_hand: (n, m, 6) which of them a person measured.
-        lasting: (n, m, 6) px, standard deviation of a shift of both points of a ski that neighbouring pulses share.
+        lasting: (n, m, 6) px, standard deviation of a shift of both points of a ski, and of a turn, that neighbouring
+            pulses share.
         factors: (6, 2) by which the standard deviations of the measurements were changed, see `scaled`.
     """
 

@@ -1,7 +1,7 @@
 """Candidates of a simulated hill's images beside the truth."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.candidates.finder import Finder
-from analysis.candidates.model import ImageCandidates, PulseCandidates, Trace
+from analysis.candidates.model import ImageCandidates, PulseCandidates
 from analysis.scene.static_image import static_image
 from rig.arrays import Floats
 from rig.clocks import UtcNs
@@ -36,9 +36,6 @@ class Verdict:
         clear, found: markers in clear sight; those with a candidate.
         errors: (2,) px, covariances (2, 2) of those.
         false: spots that belong to no marker.
-        skis, traced: skis in sight; those with a trace.
-        middles: error of each trace halfway along it over its sigma.
-        turns: the same of its direction.
         images: number of images.
     """
 
@@ -47,10 +44,6 @@ class Verdict:
     errors: list[Floats] = field(default_factory=list)
     covariances: list[Floats] = field(default_factory=list)
     false: int = 0
-    skis: int = 0
-    traced: int = 0
-    middles: list[float] = field(default_factory=list)
-    turns: list[float] = field(default_factory=list)
     images: int = 0
 
     @property
@@ -122,33 +115,17 @@ class Hill:
         states = truth(self.scenario, [HillPulse(p) for p in pulses], self.rate_hz, self.size)["pulses"]
         return list(states)
 
-    def ski_lines(self, camera: int, state: dict[str, Any]) -> dict[str, Floats]:
-        """Each ski's axis in an image from tail to tip, px (41, 2)."""
-        settings = self.scenario.cameras[camera]
-        projection = settings.projection(*self.size)
-        if settings.name in state["poses"]:
-            pose = state["poses"][settings.name]
-            projection = replace(projection, X0=np.array(pose["X0"]), R=np.array(pose["R"]))
-        late = state["middle_s"][settings.name] - state["state_s"]
-        lines = {}
-        for side, ski in state["skis"].items():
-            middle = np.array(ski["point"]) + late * np.array(state["velocity"])
-            along = _SAMPLES * self.scenario.jumper.ski_length_m * np.array(ski["direction"])
-            lines[side] = projection.pixels(middle + along)
-        return lines
-
 
 def judged(hill: Hill, pulses: Sequence[int]) -> Verdict:
     """Find the candidates of some pulses and compare them with the truth."""
     verdict = Verdict()
     for pulse, state in zip(pulses, hill.truth(pulses), strict=True):
         candidates = hill.find(pulse)
-        for i, camera in enumerate(hill.scenario.cameras):
+        for camera in hill.scenario.cameras:
             verdict.images += 1
             image = candidates.images[camera.name]
             if state["jumper_present"]:
                 _judge_spots(verdict, image, state["images"][camera.name], state["visible"][camera.name], hill.size)
-                _judge_traces(verdict, image.traces, hill.ski_lines(i, state), hill.size)
             else:
                 verdict.false += len(image.spots)
     return verdict
@@ -180,46 +157,3 @@ def _judge_spots(
             verdict.errors.append(off[k])
             verdict.covariances.append(image.spots.covariance[k])
     verdict.false += len(image.spots) - len(taken)
-
-
-def _judge_traces(verdict: Verdict, traces: Sequence[Trace], lines: dict[str, Floats], size: tuple[int, int]) -> None:
-    best: dict[int, tuple[float, Floats, Floats]] = {}
-    for line in lines.values():
-        inside = bool(((line > 4) & (line < np.array(size) - 5)).all())
-        verdict.skis += inside
-        options = []
-        for k, trace in enumerate(traces):
-            across, along = to_line(line, trace.xy)
-            worst = float(np.sqrt(np.mean(across**2)))
-            if worst < _NEAR and -0.05 < np.median(along) < 1.05:
-                options.append((worst, k, across, along))
-        if not options:
-            continue
-        worst, k, across, along = min(options, key=lambda option: option[0])
-        if inside and k not in best:
-            verdict.traced += 1
-        if k not in best or worst < best[k][0]:
-            best[k] = worst, across, along
-    for k, (_, across, along) in best.items():
-        middle, turn = _normalized(traces[k], across, along)
-        verdict.middles.append(middle)
-        verdict.turns.append(turn)
-
-
-def to_line(line: Floats, xy: Floats) -> tuple[Floats, Floats]:
-    """Distances (n,) of points from a line, and where along it they are, 0 to 1."""
-    length = float(np.hypot(*(line[-1] - line[0])))
-    u = (line[-1] - line[0]) / length
-    v = np.array((-u[1], u[0]))
-    bend = np.interp((xy - line[0]) @ u, (line - line[0]) @ u, (line - line[0]) @ v)
-    return (xy - line[0]) @ v - bend, (xy - line[0]) @ u / length
-
-
-def _normalized(trace: Trace, across: Floats, along: Floats) -> tuple[float, float]:
-    """Error of a trace halfway along it, and of its direction, over their sigmas."""
-    weight = trace.sigma**-2
-    design = np.column_stack((np.ones(len(along)), along - np.average(along, weights=weight)))
-    covariance = np.linalg.inv(design.T @ (design * weight[:, None]))
-    error = covariance @ design.T @ (weight * across)
-    sigma = np.sqrt(np.diagonal(covariance) + np.array((trace.common**2, 0.0)))
-    return float(error[0] / sigma[0]), float(error[1] / sigma[1])

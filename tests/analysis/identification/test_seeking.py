@@ -6,12 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.candidates.finder import Finder
 from analysis.candidates.model import PulseCandidates
 from analysis.identification import identify as identification
 from analysis.identification import seeking
 from analysis.identification.identify import Sighting, find_sightings, identify, sighted
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.seeking import Seeker
+from analysis.identification.ski_bars import MeasuredSkis
 from rig.arrays import Flags
 from tests.analysis.identification.cluttered import Disturbed, scene
 from tests.analysis.simulated import RATE_HZ, true_cameras, true_jump
@@ -31,7 +33,7 @@ def _found(candidates: Sequence[PulseCandidates], *, afresh: bool = False) -> li
 
 
 def test_a_jumper_is_found_as_soon_as_by_a_search_of_everything() -> None:
-    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), range(15, 36), Disturbed(20, 1))
+    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), range(15, 36), Disturbed(20))
     found = _found(made.candidates)
     assert found == _found(made.candidates, afresh=True)
     first = next(i for i, seen in enumerate(found) if seen is not None)
@@ -69,8 +71,13 @@ def test_in_a_hurry_skis_are_sought_in_the_last_moments_only(monkeypatch: pytest
     made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), range(25, 45))
     (sighting,) = find_sightings(made.candidates, true_cameras(), RATE_HZ)
     sought: list[Flags] = []
-    monkeypatch.setattr(identification, "look_for_traces", lambda *given: sought.append(given[3]))
-    sighting.measured(None)
-    sighting.measured(None, briefly=True)
+
+    def noted(*given: Any) -> list[MeasuredSkis]:
+        sought.append(given[5])
+        return [{}] * len(made.candidates)
+
+    monkeypatch.setattr(identification, "measure_skis", noted)
+    sighting.measured(Finder({}))
+    sighting.measured(Finder({}), briefly=True)
     assert sought[0].all()
     assert np.flatnonzero(sought[1]).tolist() == list(range(len(made.candidates)))[-5:]

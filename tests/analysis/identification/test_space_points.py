@@ -31,4 +31,4 @@ def test_what_hides_a_marker_does_not_take_its_other_rays() -> None:
 def _image(xy: Floats) -> ImageCandidates:
     n = len(xy)
     sigma = np.tile(SIGMA_PX**2 * np.eye(2), (n, 1, 1))
-    return ImageCandidates(Spots(xy, sigma, np.full(n, 1.6), np.full(n, 80.0), np.full(n, 9.0)), ())
+    return ImageCandidates(Spots(xy, sigma, np.full(n, 1.6), np.full(n, 80.0), np.full(n, 9.0)))

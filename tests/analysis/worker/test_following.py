@@ -1,11 +1,8 @@
 """Who is followed from pulse to pulse, and what becomes of markers that come into sight later."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from analysis.candidates.model import ImageCandidates
 from analysis.identification.seeking import Seeker
 from analysis.measurements.model import MeasuredCamera
 from analysis.result.model import Status
@@ -85,10 +82,6 @@ def test_markers_whose_names_nothing_bears_out_are_not_told(hidden: tuple[str, .
     system, truth = true_cameras(), true_jump(7)
     disturbed = Disturbed(hidden=tuple((label, None, 0, 999) for label in hidden))
     made = scene([truth], system, np.random.default_rng(1), range(15, 40), disturbed)
-    made.candidates[:] = [
-        replace(c, images={name: ImageCandidates(image.spots, ()) for name, image in c.images.items()})
-        for c in made.candidates
-    ]
     cameras = {name: MeasuredCamera((640, 480), 0.0) for name in system.names}
     follower = Follower(system, cameras, RATE_HZ)
     told = follower.find(Seeker(system, {}), made.candidates[:SOUGHT])

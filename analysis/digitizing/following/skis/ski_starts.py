@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -61,7 +62,7 @@ def ski_views(log: OpenedLog, system: CameraSystem, pulse: int, velocity: Floats
     """
     frames, nothing = log.frames(pulse), log.unmeasured
     views = [
-        SkiView(system[name], frames[name], background, nothing.late_s(name) * velocity)
+        SkiView(system[name], partial(background.part, frames[name]), nothing.late_s(name) * velocity)
         for name, background in log.backgrounds().items()
         if name in frames and name in system.names
     ]

@@ -1,1 +1,0 @@
-"""Long straight bars in single images that may be skis."""

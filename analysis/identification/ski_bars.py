@@ -1,0 +1,204 @@
+"""The skis of one jump: where the bindings are is known, so they are sought and fitted as bars in space.
+
+Their directions are sought through all pulses at once. From there both skis of a pulse are fitted in all images that
+show them: at first in the most telling pulses, which tell how long they are and how each stands to the marker of its
+binding, both the same all the jump; then in all. A ski turns smoothly: a pulse that contradicts the others is left out.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from analysis.candidates.model import SecondLook
+from analysis.identification.over_time.flights import Flight
+from analysis.identification.over_time.prediction import Part, predict
+from analysis.identification.over_time.window import Window
+from analysis.identification.space.views import Views, gate
+from analysis.measurements.model import SIDES, SkiMeasurement
+from analysis.ski_bars.bars import OF_POSE, SKIS, USUAL_SHAPE, USUAL_SHAPE_SIGMA, ExpectedBars, Poses
+from analysis.ski_bars.directions import OPENING, seek_directions
+from analysis.ski_bars.fitting import FittedBars, fit_bars
+from analysis.ski_bars.pixels import SkiView
+from photogrammetry.jumper.stick_model import by_slope_and_heading, slope_and_heading
+from rig.arrays import Flags, Floats
+
+#: Skis by side in each camera of a pulse.
+MeasuredSkis = Mapping[str, Mapping[str, SkiMeasurement]]
+
+_KNOWN_M: Final = 0.1  #: standard deviation of the place of a binding from which its ski is sought
+_FEWEST: Final = 2  #: images that show a binding
+SOUGHT_RAD: Final = np.radians(2.0)  #: standard deviation of a direction that was sought
+_BINDING_M: Final = 0.06  #: of a binding's marker from the axis of its ski, in any direction
+_STEADY_M: Final = 0.015  #: of that distance from pulse to pulse
+_TELLING: Final = 12  #: pulses that tell how long the skis are
+_FEWEST_TELLING: Final = 3  #: of each ski, so that it is believed at all
+_BY_CHANCE: Final = 0.1  #: share of the pulses in which what is no ski may be fitted as one
+_SHAPE_M: Final = (0.005, 0.03, 0.03)  #: what bend and visible ends differ by from pulse to pulse
+#: Slope and heading (rad) of both skis as sums of their mean and of half their difference: (mean, velocity,
+#: acceleration), and the change of the acceleration within 0.1 s.
+_MIXING: Final = np.array([(1.0, -1.0), (1.0, 1.0)])
+_PARTS: Final = (
+    Part(np.zeros((2, 2)), (0.4, 1.0, 10.0), 15.0),
+    Part(np.array(((0.0, OPENING / 2), (0.0, 0.0))), (0.2, 0.5, 5.0), 8.0),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bindings:
+    """Where the bindings are.
+
+    Attributes:
+        xyz: (t, 2, 3) of P3 and P4, or (2, 3) at one pulse.
+        covariance: (t, 2, 3, 3), or (2, 3, 3).
+    """
+
+    xyz: Floats
+    covariance: Floats
+
+    def at(self, t: int) -> "Bindings":
+        """At one pulse."""
+        return Bindings(self.xyz[t], self.covariance[t])
+
+
+def measure_skis(
+    views: Views, window: Window, flight: Flight, bindings: Bindings, look: SecondLook, steps: Flags
+) -> list[MeasuredSkis]:
+    """Measure both skis in the images of a window.
+
+    Args:
+        views: the cameras.
+        window: t pulses.
+        flight: of the jumper.
+        bindings: their places.
+        look: at the images.
+        steps: (t,) the pulses in which they are wanted.
+
+    Returns:
+        Of each pulse.
+    """
+    pulses = [ski_views(views, window, flight, t, look) if steps[t] else [] for t in range(len(window))]
+    known = np.array([sought_from(of, bindings.at(t)) for t, of in enumerate(pulses)])
+    if not known.any():
+        return [{} for _ in pulses]
+    sought = seek_directions(pulses, bindings.xyz, known, window.time_s, flight.axes)
+    pair = SkiPair()
+    turning = np.tile(SOUGHT_RAD**2 * np.eye(2), (SKIS, 1, 1))
+
+    def fitted(t: int) -> FittedBars:
+        return pair.fitted(pulses[t], bindings.at(t), sought.direction[t], turning, known[t])
+
+    telling = [int(t) for t in np.argsort(-sought.gain.sum(axis=1))[:_TELLING] if known[t].any()]
+    pair.learn([(fitted(t), bindings.xyz[t]) for t in telling])
+    found = [fitted(t) if known[t].any() else None for t in range(len(window))]
+    seen = np.array([(False, False) if fit is None else fit.seen for fit in found])
+    seen = _smooth(seen, found, window.time_s, flight)
+    seen &= seen.sum(axis=0) > _BY_CHANCE * known.sum(axis=0)
+    return [{} if fit is None else measured(fit, own) for fit, own in zip(found, seen, strict=True)]
+
+
+def ski_views(views: Views, window: Window, flight: Flight, t: int, look: SecondLook) -> list[SkiView]:
+    """The images of a pulse of a window."""
+    pulse, velocity = window.candidates[t].pulse, flight.velocity(window.time_s[t : t + 1])[0]
+    return [
+        SkiView(placed, partial(look.part, pulse, name), velocity * window.late_s[k])
+        for k, (name, placed) in enumerate(zip(views.names, views.placed, strict=True))
+        if window.delivered[t, k]
+    ]
+
+
+def sought_from(views: Sequence[SkiView], bindings: Bindings) -> Flags:
+    """Of which skis (2,) a binding is known so well, and shown by so many cameras, that they can be sought."""
+    known = np.linalg.eigvalsh(bindings.covariance)[:, -1] < _KNOWN_M**2
+    count = np.zeros(SKIS)
+    for view in views:
+        px = view.camera.project(bindings.xyz + view.shift)
+        count += ((px >= 0) & (px <= view.camera.size - 1)).all(axis=1)
+    return np.asarray(known & (count >= _FEWEST))
+
+
+class SkiPair:
+    """What is known of the skis of a jump: how long and how bent they are, and how each stands to its marker."""
+
+    def __init__(self) -> None:
+        self._shape, self._shape_sigma = np.tile(USUAL_SHAPE, (SKIS, 1)), np.tile(USUAL_SHAPE_SIGMA, (SKIS, 1))
+        self._offset, self._offset_sigma = np.zeros((SKIS, 3)), np.full(SKIS, _BINDING_M)
+
+    def fitted(
+        self, views: Sequence[SkiView], bindings: Bindings, direction: Floats, turning: Floats, known: Flags
+    ) -> FittedBars:
+        """Both skis of a pulse.
+
+        Args:
+            views: images of the pulse.
+            bindings: (2,) their places.
+            direction: (2, 3) expected.
+            turning: (2, 2, 2) covariance of that, of turns to the side and in the vertical plane, rad^2.
+            known: (2,) which ski is expected.
+        """
+        direction = np.where(known[:, None], direction, direction[::-1])
+        point = bindings.xyz + (self._offset[:, None] @ _frames(direction))[:, 0]
+        covariance = np.zeros((SKIS * OF_POSE, SKIS * OF_POSE))
+        for k in range(SKIS):
+            place = slice(OF_POSE * k, OF_POSE * k + 3)
+            turns = slice(place.stop, place.stop + 2)
+            covariance[place, place] = bindings.covariance[k] + self._offset_sigma[k] ** 2 * np.eye(3)
+            covariance[turns, turns] = turning[k]
+        expected = ExpectedBars(Poses(point, direction), covariance, self._shape, self._shape_sigma)
+        return fit_bars(views, expected, (bool(known[0]), bool(known[1])), near=True)
+
+    def learn(self, seen: Sequence[tuple[FittedBars, Floats]]) -> None:
+        """Learn from some pulses: skis as fitted, and places (2, 3) of the markers of their bindings."""
+        for k in range(SKIS):
+            own = [(fit, xyz[k]) for fit, xyz in seen if fit.seen[k]]
+            if len(own) < _FEWEST_TELLING:
+                continue
+            self._shape[k], self._shape_sigma[k] = np.median([fit.shape[k] for fit, _ in own], axis=0), _SHAPE_M
+            off = [_frames(fit.poses.direction)[k] @ (fit.poses.point[k] - xyz) for fit, xyz in own]
+            self._offset[k], self._offset_sigma[k] = np.median(off, axis=0), _STEADY_M
+
+
+def _frames(direction: Floats) -> Floats:
+    """Unit vectors (2, 3, 3) along each ski, to the side and in the vertical plane, as rows."""
+    aside, normal = Poses(np.zeros((SKIS, 3)), direction).axes()
+    return np.stack((direction, aside, normal), axis=1)
+
+
+def _smooth(seen: Flags, fitted: Sequence[FittedBars | None], time_s: Floats, flight: Flight) -> Flags:
+    """Which of the seen skis (t, 2) do not contradict those of the other pulses."""
+    angles, spread = np.full((len(fitted), SKIS, 2), np.nan), np.full((len(fitted), SKIS, 2, 2), np.nan)
+    for t, k in np.argwhere(seen).tolist():
+        if (fit := fitted[t]) is None:
+            continue
+        local = fit.poses.direction[k] @ flight.axes.T
+        turns = np.stack([axis[k] for axis in fit.poses.axes()], axis=1)
+        own = slice(OF_POSE * k + 3, OF_POSE * (k + 1))
+        of_direction = flight.axes @ turns @ fit.covariance[own, own] @ turns.T @ flight.axes.T
+        by = np.linalg.pinv(by_slope_and_heading(local[None])[0])
+        angles[t, k], spread[t, k] = slope_and_heading(local), by @ of_direction @ by.T
+    kept = seen.copy()
+    while kept.any():
+        values = np.where(kept[..., None], angles, np.nan), np.where(kept[..., None, None], spread, np.nan)
+        others = predict(time_s, *values, _PARTS, _MIXING)
+        off = np.where(kept[..., None], angles - others.xyz, 0.0)
+        total = others.covariance + np.where(kept[..., None, None], spread, np.eye(2))
+        misfit = (off * np.linalg.solve(total, off[..., None])[..., 0]).sum(axis=-1)
+        if misfit.max() < gate(2):
+            break
+        kept[np.unravel_index(int(misfit.argmax()), misfit.shape)] = False
+    kept &= kept.sum(axis=0) >= _FEWEST_TELLING
+    return kept
+
+
+def measured(fit: FittedBars, seen: Flags) -> MeasuredSkis:
+    """What the images of a pulse show of those skis that are seen (2,)."""
+    return {
+        camera: {
+            side: SkiMeasurement(line.xy, np.full(2, line.sigma), lasting=line.lasting)
+            for k, side in enumerate(SIDES)
+            if seen[k] and (line := lines[k]) is not None
+        }
+        for camera, lines in fit.lines.items()
+    }

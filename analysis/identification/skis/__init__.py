@@ -1,1 +1,0 @@
-"""Which traces show which ski."""

@@ -1,0 +1,62 @@
+"""The directions of skis are found from their bindings alone, through the pulses."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from analysis.candidates.foreground.background import Background
+from analysis.scene.static_image import StaticImage
+from analysis.ski_bars.directions import Directions, seek_directions
+from analysis.ski_bars.pixels import SkiView
+from bench.analysis.simulated import true_cameras
+from rig.arrays import Floats
+from tests.analysis.digitizing.following.tracked_hill import NAMES, RATE_HZ, TrackedHill, hill
+
+SYSTEM = true_cameras()
+BINDING_M = 0.01
+AXES = np.diag((1.0, 1.0, 1.0))  # the hill's X axis leads forward
+
+
+@pytest.fixture(scope="module", params=[21, 24, 27, 30])
+def of(request: pytest.FixtureRequest) -> TrackedHill:
+    return hill(request.param)
+
+
+def _sought(of: TrackedHill, pulses: list[int], *, empty: bool = False) -> Directions:
+    backgrounds = {}
+    for name in NAMES:
+        grey = np.median([of.frames(p)[name] for p in (30, 31, 78, 79)], axis=0).astype(np.float32)
+        backgrounds[name] = Background(StaticImage(name, grey, np.full_like(grey, 2.0), 4))
+    views = [
+        [
+            SkiView(SYSTEM[name], partial(backgrounds[name].part, of.frames(30 if empty else pulse)[name]), np.zeros(3))
+            for name in NAMES
+        ]
+        for pulse in pulses
+    ]
+    rng = np.random.default_rng(5)
+    bindings = np.array([[of.truth[p]["points"][label] for label in ("P3", "P4")] for p in pulses])
+    bindings = bindings + rng.normal(0, BINDING_M, bindings.shape)
+    known = np.ones((len(pulses), 2), bool)
+    return seek_directions(views, bindings, known, np.array(pulses) / RATE_HZ, AXES)
+
+
+def _off_deg(of: TrackedHill, pulses: list[int], found: Directions) -> Floats:
+    true = np.array([[of.truth[p]["skis"][side]["direction"] for side in ("right", "left")] for p in pulses])
+    cosine = np.clip((true * found.direction).sum(axis=-1), -1, 1)
+    return np.asarray(np.degrees(np.arccos(cosine)))
+
+
+def test_directions_are_found_to_some_degrees(of: TrackedHill) -> None:
+    pulses = of.in_sight("P3")[::2]
+    off = _off_deg(of, pulses, _sought(of, pulses))
+    assert off.size >= 16
+    assert np.median(off) < 2.5
+    assert np.quantile(off, 0.9) < 8.0, "a fit finds most skis from there"
+    assert off.max() < 16.0
+
+
+def test_where_there_is_no_ski_less_speaks_for_one(of: TrackedHill) -> None:
+    pulses = of.in_sight("P3")[::4]
+    assert _sought(of, pulses).gain.mean() > 2 * _sought(of, pulses, empty=True).gain.mean()

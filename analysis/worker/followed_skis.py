@@ -5,20 +5,20 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from scipy.special import chdtri
 
 from analysis.identification.over_time.prediction import Prediction
 from analysis.identification.ski_bars import SOUGHT_RAD, Bindings, MeasuredSkis, SkiPair, measured, sought_from
-from analysis.ski_bars.bars import OF_POSE, SKIS
+from analysis.identification.space.views import gate
+from analysis.ski_bars.bars import SKIS, Poses
 from analysis.ski_bars.directions import directions, seek_directions
 from analysis.ski_bars.fitting import FittedBars
 from analysis.ski_bars.pixels import SkiView
-from rig.arrays import Floats
+from rig.arrays import Flags, Floats
 
-#: A direction that is predicted better than this is fitted from there; otherwise it is sought.
+#: A direction that is predicted better than this is fitted from there; otherwise it is sought in the last moments.
 _PREDICTED_RAD: Final = np.radians(4.0)
+_MOMENTS: Final = 5  #: pulses: in one alone a leg may be the better line
 _RECENT: Final = 30  #: pulses that tell how long the skis are
-_RISK: Final = 1e-4  #: probability of a sound pulse to contradict its prediction
 
 
 class FollowedSkis:
@@ -27,17 +27,22 @@ class FollowedSkis:
     def __init__(self) -> None:
         self._pair = SkiPair()
         self._seen: deque[tuple[FittedBars, Floats]] = deque(maxlen=_RECENT)
+        self._moments: deque[tuple[float, Sequence[SkiView], Floats, Flags]] = deque(maxlen=_MOMENTS)
 
-    def measured(self, views: Sequence[SkiView], bindings: Bindings, angles: Prediction, axes: Floats) -> MeasuredSkis:
+    def measured(
+        self, time_s: float, views: Sequence[SkiView], bindings: Bindings, angles: Prediction, axes: Floats
+    ) -> MeasuredSkis:
         """What the images of the next pulse show of them.
 
         Args:
-            views: images of the pulse.
+            time_s: of the pulse.
+            views: its images.
             bindings: (2,) their places.
             angles: (1, 2, 2) slope and heading in the frame of the flight, predicted, rad.
             axes: (3, 3) of that frame.
         """
         known = sought_from(views, bindings)
+        self._moments.append((time_s, views, bindings.xyz, known))
         if not known.any():
             return {}
         sure = np.linalg.eigvalsh(angles.covariance[0])[:, -1] < _PREDICTED_RAD**2
@@ -47,11 +52,15 @@ class FollowedSkis:
         by_angles = np.array([((0.0, -np.cos(s)), (1.0, 0.0)) for s in slope])
         turning = by_angles @ angles.covariance[0] @ by_angles.swapaxes(1, 2)
         if (unsure := known & ~sure).any():
-            sought = seek_directions([views], bindings.xyz[None], unsure[None], np.zeros(1), axes)
-            direction[unsure], turning[unsure] = sought.direction[0][unsure], SOUGHT_RAD**2 * np.eye(2)
+            times, pulses, places, there = zip(*self._moments, strict=True)
+            sought = seek_directions(pulses, np.array(places), np.array(there), np.array(times), axes)
+            direction[unsure], turning[unsure] = sought.direction[-1][unsure], SOUGHT_RAD**2 * np.eye(2)
         fit = self._pair.fitted(views, bindings, direction, turning, known)
-        if fit.distance > chdtri(SKIS * OF_POSE, _RISK):
-            return {}
+        turned = Poses(bindings.xyz, direction).step_to(fit.poses)[:, 3:]
+        contradiction = (turned * np.linalg.solve(turning, turned[..., None])[..., 0]).sum(axis=1)
+        seen = np.array(fit.seen) & (contradiction < gate(2))
+        if len(self._moments) < _MOMENTS:
+            seen &= sure  # what was sought in one or two pulses alone may be anything
         self._seen.append((fit, bindings.xyz))
         self._pair.learn(self._seen)
-        return measured(fit, np.array(fit.seen))
+        return measured(fit, seen)

@@ -160,7 +160,8 @@ class Follower:
         skis: MeasuredSkis = {}
         if look is not None:
             images = ski_views(views, window, flight, 0, look)
-            skis = self._skis.measured(images, bindings.at(0), _angles(state, flight), flight.axes)
+            time_s = float(window.time_s[0])
+            skis = self._skis.measured(time_s, images, bindings.at(0), _angles(state, flight), flight.axes)
         measured = named_pulse(views, window.candidates[0], assigned.rays[0], skis)
         found = self._filter.update(measured)
         if found is None:

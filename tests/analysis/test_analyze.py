@@ -122,7 +122,7 @@ def _the_example_of_the_documentation_runs(
 ) -> None:
     """As it stands there, except that it does not look for the jumper once more."""
     page = Path(__file__).resolve().parents[2] / "docs" / "measuring.md"
-    (example,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    (example,) = re.findall(r"```python\n(from pathlib .*?)```", page.read_text(), re.DOTALL)
     known = functools.partial(analyze, by_hand=read_measurements(out / "measurements.json"), images=False)
     monkeypatch.setattr("analysis.procedure.analyze.analyze", known)
     exec(example, {"LOG": str(jump.path), "SURVEY": str(jump.survey), "OUT": str(again)})  # noqa: S102

@@ -28,6 +28,7 @@ WORST_MODEL: Final = 0.2
 _SHOVEL: Final = 0.3  #: m of the shovel, whose form is not that of the model
 _SIGMAS = 3.0  # residuals that count a quarter
 _MAD_TO_SIGMA = 1.4826
+_TAILS = 1.25  # times m in covariances: the tails of its errors, which their median does not tell
 _BESIDE_PX = 2.0  # beside a ski, whose pixels still tell m
 _ITERATIONS, _ROUNDS = 12, 2
 _ENOUGH = 0.05  # of a standard deviation: a smaller step changes nothing
@@ -202,7 +203,7 @@ class BarFit:
         weight = self.weights(x, seen, fitted, m)
         weighted = weight[:, None] * rows
         by_noise, by_model = weighted.T @ (self.pixels.noise[:, None] * weighted), np.zeros((rows.shape[1],) * 2)
-        error = np.sqrt(self._model_variance(x, seen, m))[:, None] * weighted
+        error = _TAILS * np.sqrt(self._model_variance(x, seen, m))[:, None] * weighted
         nearest = np.abs(seen.u).argmin(axis=1)
         for c in range(len(self.model.views)):
             for k in np.flatnonzero(self.model.present).tolist():

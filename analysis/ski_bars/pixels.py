@@ -15,7 +15,7 @@ from rig.arrays import Flags, Floats, Integers
 #: Px beside and beyond a ski that are looked at.
 REACH_PX: Final = 4.0
 #: Px along a ski that are taken together: the errors of the model are alike over more.
-CELL_PX: Final = 3
+CELL_PX: Final = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)

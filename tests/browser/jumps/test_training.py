@@ -206,7 +206,7 @@ def test_a_dead_camera_is_named_with_what_to_do(tmp_path: Path, loopback: Loopba
         stop(page)
         page.get_by_role("button", name="Look at it").click()
         expect(page.locator("#recording-verdict")).to_contain_text(
-            re.compile(r"pulses lack a frame: .*K2 \d+ (lost|absent)")
+            re.compile(r"pulses lack a frame: .*K2 (\d+ damaged, )?\d+ (lost|absent)")
         )
         press(page, "Next gap")
         expect(page.locator("#frame-fate")).to_contain_text(re.compile(r"K1 whole.*K2 (lost|absent).*K3 whole"))

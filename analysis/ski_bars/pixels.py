@@ -10,7 +10,7 @@ import numpy as np
 from analysis.candidates.foreground.background import Region
 from analysis.scene.camera_system import PlacedCamera
 from analysis.ski_bars.bars import SKIS, Poses
-from rig.arrays import Flags, Floats, Integers
+from rig.arrays import Floats, Integers
 
 #: Px beside and beyond a ski that are looked at.
 REACH_PX: Final = 4.0
@@ -35,10 +35,6 @@ class Pixels:
     grey: Floats
     behind: Floats
     noise: Floats
-
-    def some(self, chosen: Flags) -> "Pixels":
-        """Those that are chosen."""
-        return Pixels(*(getattr(self, name)[chosen] for name in ("camera", "xy", "grey", "behind", "noise")))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

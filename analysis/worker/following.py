@@ -28,6 +28,7 @@ from analysis.motion.causal import CausalFilter
 from analysis.procedure.names import measured_parts, told_names, told_state
 from analysis.result.model import JumperState, SmoothedState, Status
 from analysis.scene.camera_system import CameraSystem
+from analysis.ski_bars.directions import HEADING_SIGMA, SLOPE_SIGMA
 from analysis.worker.followed_skis import FollowedSkis
 from rig.arrays import Flags, Floats
 from rig.clocks import UtcNs
@@ -37,7 +38,6 @@ from rig.pulse import PulseNumber
 _LOST_S: Final = 0.25
 #: A marker is looked for within so many standard deviations of its prediction and so many of its radii.
 _SIGMAS, _RADII = 4.0, 8.0
-_ANYHOW_DEG: Final = np.array((25.0, 15.0))  #: slope and heading of skis against the flight, standard deviations
 _FEWEST_CAMERAS: Final = 2  #: that must be able to see any of his markers
 _BEGIN: Final = 4  #: pulses that show somebody before he is followed
 #: Markers whose place is not known are sought after so long a time, then again whenever that time has doubled.
@@ -264,7 +264,7 @@ def _flight(state: SmoothedState, time_s: float) -> Flight:
 def _angles(state: SmoothedState, flight: Flight) -> Prediction:
     """Slope and heading of both skis in the frame of the flight, rad; along the flight if they are unknown."""
     course = np.degrees(np.arctan2(flight.axes[0, 1], flight.axes[0, 0]))
-    values, covariance = np.zeros((1, 2, 2)), np.tile(np.diag(np.radians(_ANYHOW_DEG) ** 2), (1, 2, 1, 1))
+    values, covariance = np.zeros((1, 2, 2)), np.tile(np.diag((SLOPE_SIGMA**2, HEADING_SIGMA**2)), (1, 2, 1, 1))
     for i, side in enumerate(SIDES):
         if (ski := state.skis[side]) is None:
             continue

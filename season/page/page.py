@@ -1,7 +1,5 @@
 """The page as HTML: what to look at first, athletes, hills, cameras; it runs no script and loads nothing."""
 
-import base64
-import hashlib
 import os
 from functools import partial
 from html import escape
@@ -16,6 +14,7 @@ from analysis.comparison.report import WORDS
 from analysis.report.compared.words import figure, first_letter_large, quantity
 from analysis.report.figures import decimals, fixed, plus_minus
 from analysis.report.language import LANGUAGES, Said, same, shown
+from analysis.report.still_page import still_page
 from analysis.result.model import Quantity as Number
 from rig.errors import StorageError
 from rig.host.disk import replace_file
@@ -158,11 +157,4 @@ def _cameras(content: Content) -> str:
 
 def _whole(title: str, body: str) -> str:
     style = files("season.page").joinpath("season.css").read_text(encoding="utf-8")
-    sha = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode("ascii")
-    policy = f"default-src 'none'; style-src 'sha256-{sha}'; base-uri 'none'; form-action 'none'"
-    head = (
-        f'<meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{style}</style>"
-    )
-    return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
+    return still_page(title, body, style)

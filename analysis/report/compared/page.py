@@ -1,9 +1,6 @@
 """The page of a comparison: needs no other file, runs no script, and has all words in both languages."""
 
-import base64
-import hashlib
 from datetime import UTC, datetime
-from html import escape
 from importlib.resources import files
 from typing import Final
 
@@ -18,6 +15,7 @@ from analysis.report.compared.places import Images, at_places
 from analysis.report.compared.words import figure, first_letter_large, quantity, said, text
 from analysis.report.course import course_of
 from analysis.report.language import LANGUAGES, Language, Said, day_of, same, shown
+from analysis.report.still_page import still_page
 from analysis.result.model import QUANTITIES
 from rig.clocks import NS_PER_S
 
@@ -72,14 +70,7 @@ def _known(d: Difference, name: str) -> bool:
 
 def _whole(title: str, body: str, language: Language) -> str:
     style = files("analysis.report.compared").joinpath("compared.css").read_text(encoding="utf-8")
-    sha = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode("ascii")
-    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{sha}'; base-uri 'none'; form-action 'none'"
-    head = (
-        f'<meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{style}</style>"
-    )
-    return f'<!doctype html>\n<html lang="{language}"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
+    return still_page(title, body, style, language=language, images=True)
 
 
 def _head(jumps: tuple[MeasuredJump, MeasuredJump], language: Language) -> str:

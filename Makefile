@@ -43,7 +43,7 @@ test: setup $(NPM) ## all tests but the long ones
 	@tests/run $(WORKERS) "not long" $(ARGS)
 
 test-long: setup $(NPM) ## the tests that take long by nature: soak, every fault, statistics of sigmas, packaging
-	@tests/run $(WORKERS) long $(ARGS)
+	@tests/run $(WORKERS) long -o timeout=400 $(ARGS)
 
 check: style test ## format, lint, types, layers, tests; CI tries the wheel and runs the long tests as well
 

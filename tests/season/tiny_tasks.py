@@ -5,12 +5,12 @@ A process of its own, since Dask's loop thread lives as long as the interpreter.
 
 import json
 import os
-import resource
 import signal
 from pathlib import Path
 
 from season.campaign import Cluster
 from season.running.engine import engine, run_tasks
+from tests.support.processes import peak_memory_bytes
 
 
 class Heard:
@@ -49,5 +49,5 @@ def main(folder: str, names: list[str]) -> None:
     with engine(Cluster(workers=2, memory_gb=1.0), "127.0.0.1:0") as on:
         about = {"threads": on.threads, "dashboard": on.dashboard}
         run_tasks(on, note, {name: Path(folder) / name for name in names}, heard)
-    most_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
+    most_mb = peak_memory_bytes() / 1e6
     print(json.dumps({**about, "ended": heard.ended, "most_mb": most_mb}))  # noqa: T201 - read by the test

@@ -91,6 +91,12 @@ def end(process: Process) -> None:
         os.waitpid(process.pid, 0)
 
 
+def peak_memory_bytes() -> int:
+    """The most memory that this program has used so far; getrusage also counts that of the process that started it."""
+    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) * 1024
+
+
 def _read(pid: int, since: int = 0) -> Process | None:
     """The process of this number; None if it has just gone, or was started before `since` (clock ticks)."""
     try:

@@ -20,6 +20,7 @@ from recorder.catalogue.folder import Catalogue
 from rig.errors import SvevError
 from svev import console
 from svev.cli import main
+from tests.support.processes import peak_memory_bytes
 
 _ADDRESS_SPACE = 3 << 30
 
@@ -67,14 +68,8 @@ def _run(command: Callable[[], int]) -> dict[str, object]:
         "complaints": complaints.getvalue(),
         "traceback": raised,
         "seconds": round(time.monotonic() - begin, 3),
-        "peak_mb": _peak_mb(),
+        "peak_mb": peak_memory_bytes() // 1024**2,
     }
-
-
-def _peak_mb() -> int:
-    """The most memory that this program has used so far; getrusage also counts that of the process that started it."""
-    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
-    return int(line.split()[1]) // 1024
 
 
 def run_all(folder: Path, names: list[str]) -> None:

@@ -23,10 +23,9 @@ from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.long
-
 #: A jump needs 9 s: 4 s for the static images, 4 s until it comes, 1 s to be over. The analysis is nice to all others.
 _MEASURED_S = 3 * PATIENCE_S
+pytestmark = [pytest.mark.long, pytest.mark.timeout(3 * _MEASURED_S)]
 FIGURES = ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body")
 
 
@@ -41,7 +40,8 @@ def test_a_jump_is_measured_while_it_is_recorded(tmp_path: Path, loopback: Loopb
             lambda: _alarm(service).startswith("jumps are recorded, but not measured: "), "alarm", PATIENCE_S, 0.1
         )
         surveyed.write_text(json.dumps(survey(training())))
-        recording = service.post("/api/recordings", {"preroll_s": 0.0})["id"]
+        order = {"preroll_s": 0.0, "duration_s": 2 * _MEASURED_S}  # else it ends by itself where nobody stops it
+        recording = service.post("/api/recordings", order)["id"]
         jump, pid = _await_jump(service), service.pids()["analysis"]
         assert not _alarm(service)
         _balls_are_where_they_should_be(service, recording)

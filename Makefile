@@ -43,7 +43,8 @@ test: setup $(NPM) ## all tests but the long ones
 	@tests/run $(WORKERS) "not long" $(ARGS)
 
 test-long: setup $(NPM) ## the tests that take long by nature: soak, every fault, statistics of sigmas, packaging
-	@tests/run $(WORKERS) long -o timeout=400 $(ARGS)
+	@tests/run $(WORKERS) "long and not alone" -o timeout=400 $(ARGS)
+	@tests/run 1 "long and alone" $(ARGS)
 
 check: style test ## format, lint, types, layers, tests; CI tries the wheel and runs the long tests as well
 

@@ -16,7 +16,7 @@ from tests.service.serving import serving
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.long, pytest.mark.alone, pytest.mark.timeout(600)]
 
 TOKEN = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of this test alone
 #: A name that leads a browser here (RFC 6761, 6.3) and that the service takes for a name in the network.

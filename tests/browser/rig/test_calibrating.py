@@ -191,6 +191,7 @@ def _attached(log: Path) -> dict[str, Any]:
 
 
 @pytest.mark.long
+@pytest.mark.alone
 @pytest.mark.timeout(600)
 def test_a_board_held_before_the_cameras_calibrates_them(tmp_path: Path, loopback: Loopback, open_page: Open) -> None:
     rig = _board_rig(tmp_path, loopback)

@@ -25,7 +25,7 @@ from tests.support.waiting import wait_until
 
 #: A jump needs 9 s: 4 s for the static images, 4 s until it comes, 1 s to be over. The analysis is nice to all others.
 _MEASURED_S = 3 * PATIENCE_S
-pytestmark = [pytest.mark.long, pytest.mark.timeout(3 * _MEASURED_S)]
+pytestmark = [pytest.mark.long, pytest.mark.alone, pytest.mark.timeout(3 * _MEASURED_S)]
 FIGURES = ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body")
 
 

@@ -244,6 +244,7 @@ def test_a_queue_that_cannot_be_read_is_said(bench: Bench) -> None:
 
 @pytest.mark.timeout(600)  # the program that measures takes what others leave of the processors
 @pytest.mark.long
+@pytest.mark.alone
 def test_after_the_measuring_come_a_video_and_a_copy_on_another_disk(bench: Bench, tmp_path: Path) -> None:
     other = tmp_path / "other disk"
     bench.further = {"after_recording": ("measure", "video", "copy"), "copy_to": other}

@@ -74,6 +74,7 @@ def test_a_change_while_the_log_is_being_measured_is_not_overlooked(tmp_path: Pa
 
 
 @pytest.mark.long
+@pytest.mark.alone
 def test_a_survey_that_comes_late_measures_the_jumps_of_before_by_itself(bench: Bench) -> None:
     right, bench.survey = bench.survey, bench.folder / "late.json"
     assert right is not None

@@ -18,7 +18,7 @@ from tests.support.waiting import wait_until
 
 #: The measuring gets only the processor time that nobody else wants.
 _MEASURED_S = 4 * PATIENCE_S
-pytestmark = [pytest.mark.long, pytest.mark.timeout(3 * _MEASURED_S)]
+pytestmark = [pytest.mark.long, pytest.mark.alone, pytest.mark.timeout(3 * _MEASURED_S)]
 
 #: A jump comes every 4 s; the balls want some seconds without a jumper.
 _LENGTH_S = 9.0

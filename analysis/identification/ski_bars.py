@@ -166,18 +166,26 @@ def _frames(direction: Floats) -> Floats:
     return np.stack((direction, aside, normal), axis=1)
 
 
+def by_turns(poses: Poses, axes: Floats) -> Floats:
+    """Derivatives (2, 2, 2) of slope and heading of both skis by their turns (`Poses.axes`).
+
+    Args:
+        poses: of the skis.
+        axes: (3, 3) of the frame of slope and heading, as rows.
+    """
+    turns = np.stack(poses.axes(), axis=-1)
+    return np.asarray(np.linalg.pinv(by_slope_and_heading(poses.direction @ axes.T)) @ axes @ turns)
+
+
 def _smooth(seen: Flags, fitted: Sequence[FittedBars | None], time_s: Floats, flight: Flight) -> Flags:
     """Which of the seen skis (t, 2) do not contradict those of the other pulses."""
     angles, spread = np.full((len(fitted), SKIS, 2), np.nan), np.full((len(fitted), SKIS, 2, 2), np.nan)
     for t, k in np.argwhere(seen).tolist():
         if (fit := fitted[t]) is None:
             continue
-        local = fit.poses.direction[k] @ flight.axes.T
-        turns = np.stack([axis[k] for axis in fit.poses.axes()], axis=1)
-        own = slice(OF_POSE * k + 3, OF_POSE * (k + 1))
-        of_direction = flight.axes @ turns @ fit.covariance[own, own] @ turns.T @ flight.axes.T
-        by = np.linalg.pinv(by_slope_and_heading(local[None])[0])
-        angles[t, k], spread[t, k] = slope_and_heading(local), by @ of_direction @ by.T
+        own, turned = slice(OF_POSE * k + 3, OF_POSE * (k + 1)), by_turns(fit.poses, flight.axes)[k]
+        angles[t, k] = slope_and_heading(fit.poses.direction[k] @ flight.axes.T)
+        spread[t, k] = turned @ fit.covariance[own, own] @ turned.T
     kept = seen.copy()
     while kept.any():
         values = np.where(kept[..., None], angles, np.nan), np.where(kept[..., None, None], spread, np.nan)

@@ -2,12 +2,21 @@
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from analysis.identification.over_time.prediction import Prediction
-from analysis.identification.ski_bars import SOUGHT_RAD, Bindings, MeasuredSkis, SkiPair, measured, sought_from
+from analysis.identification.ski_bars import (
+    SOUGHT_RAD,
+    Bindings,
+    MeasuredSkis,
+    SkiPair,
+    by_turns,
+    measured,
+    sought_from,
+)
 from analysis.identification.space.views import gate
 from analysis.ski_bars.bars import SKIS, Poses
 from analysis.ski_bars.directions import directions, seek_directions
@@ -48,8 +57,7 @@ class FollowedSkis:
         sure = np.linalg.eigvalsh(angles.covariance[0])[:, -1] < _PREDICTED_RAD**2
         slope, heading = angles.xyz[0].T
         direction = np.stack([directions(slope[k : k + 1], heading[k : k + 1], axes)[0, 0] for k in range(SKIS)])
-        # a turn to the side is one of the heading times the cosine of the slope; to the left it counts backward
-        by_angles = np.array([((0.0, -np.cos(s)), (1.0, 0.0)) for s in slope])
+        by_angles = np.linalg.inv(by_turns(Poses(bindings.xyz, direction), axes))
         turning = by_angles @ angles.covariance[0] @ by_angles.swapaxes(1, 2)
         if (unsure := known & ~sure).any():
             times, pulses, places, there = zip(*self._moments, strict=True)
@@ -61,6 +69,7 @@ class FollowedSkis:
         seen = np.array(fit.seen) & (contradiction < gate(2))
         if len(self._moments) < _MOMENTS:
             seen &= sure  # what was sought in one or two pulses alone may be anything
+        fit = replace(fit, seen=(bool(seen[0]), bool(seen[1])))  # what contradicts tells nothing of the shape either
         self._seen.append((fit, bindings.xyz))
         self._pair.learn(self._seen)
         return measured(fit, seen)

@@ -5,6 +5,7 @@ import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any, Final
@@ -15,10 +16,12 @@ from bench.corpus.draws import PIXELS_MOST, Half, draw
 from bench.corpus.judging import Row, judge
 from bench.corpus.tables import GROUPS, summed, table
 from bench.results import write_results
+from rig.errors import BadInputError
 
 _HOUSE: Final = Path(__file__).parents[2]
 _CACHE: Final = _HOUSE / ".cache" / "corpus"
 _RESULTS: Final = _HOUSE / "bench" / "results"
+_RENDERERS: Final = ("hill", "drawn", "path-traced")
 #: The rooms whose code decides what a row holds.
 _ROOMS: Final = ("analysis", "photogrammetry", "simrig", "recorder", "rig", "bench/corpus", "bench/analysis")
 
@@ -29,21 +32,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
     halves = list(Half) if asked.half == "both" else [Half(asked.half)]
     cache = None if asked.fresh else asked.cache / _digest(asked.pixels)
     drawn = {"first": asked.first, "scenes": asked.scenes, "pixels": asked.pixels}
+    kind = f"-{asked.renderer}" if asked.renderer else ""
     for half in halves:
         numbers = range(asked.first, asked.first + asked.scenes)
         rows = []
-        for row in measured(half, numbers, asked.pixels, asked.workers, cache):
-            rows.append(row)
-            done = f"{len(rows)} of {asked.scenes}"
-            print(f"{half}: {done}" if half is Half.HELD_OUT else f"{half}: {done}: {said(row)}", flush=True)
-        name = f"corpus-{half}"
+        try:
+            for row in measured(half, numbers, asked.pixels, asked.workers, cache, asked.renderer):
+                rows.append(row)
+                done = f"{len(rows)} of {asked.scenes}"
+                print(f"{half}: {done}" if half is Half.HELD_OUT else f"{half}: {done}: {said(row)}", flush=True)
+        except BadInputError as error:  # no Blender
+            raise SystemExit(str(error)) from error
+        name = f"corpus-{half}{kind}"
         before = _before(asked.results / f"{name}.json", drawn)
         print(*table(rows, before), sep="\n")
         groups = {group: msgspec.to_builtins(summed([*filter(of, rows)])) for group, of in GROUPS.items()}
         print(write_results(name, [{**drawn, "groups": groups}], asked.results))
 
 
-def measured(half: Half, numbers: range, pixels_most: int, workers: int, cache: Path | None) -> Iterator[Row]:
+def measured(
+    half: Half, numbers: range, pixels_most: int, workers: int, cache: Path | None, renderer: str | None = None
+) -> Iterator[Row]:
     """Rows of scenes, in order, each from the cache if the code has not changed since.
 
     Args:
@@ -52,8 +61,9 @@ def measured(half: Half, numbers: range, pixels_most: int, workers: int, cache: 
         pixels_most: see `bench.corpus.draws.draw`.
         workers: processes at a time.
         cache: folder of the rows of this state of the code; None: nothing is kept.
+        renderer: of all scenes; None: each has the one that is drawn for it.
     """
-    jobs = [(half, number, pixels_most, cache) for number in numbers]
+    jobs = [(half, number, pixels_most, cache, renderer) for number in numbers]
     if workers == 1:
         yield from map(_row, jobs)
         return
@@ -73,13 +83,14 @@ def said(row: Row) -> str:
     )
 
 
-def _row(job: tuple[Half, int, int, Path | None]) -> Row:
-    half, number, pixels_most, cache = job
-    kept = None if cache is None else cache / f"{half}-{number}.json"
+def _row(job: tuple[Half, int, int, Path | None, str | None]) -> Row:
+    half, number, pixels_most, cache, renderer = job
+    kept = None if cache is None else cache / f"{half}-{number}{f'-{renderer}' if renderer else ''}.json"
     if kept is not None and kept.exists():
         return msgspec.json.decode(kept.read_bytes(), type=Row)
     with tempfile.TemporaryDirectory(prefix="svev-corpus-") as folder:
-        row = judge(draw(half, number, pixels_most), Path(folder))
+        scene = draw(half, number, pixels_most)
+        row = judge(replace(scene, renderer=renderer or scene.renderer), Path(folder))
     if kept is not None:
         kept.parent.mkdir(parents=True, exist_ok=True)
         part = kept.with_suffix(f".{os.getpid()}")
@@ -113,6 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--first", type=int, default=0, metavar="N", help="number of the first one (0)")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes at a time")
     parser.add_argument("--pixels", type=int, default=PIXELS_MOST, metavar="N", help="pixels of a log at most")
+    parser.add_argument("--renderer", choices=_RENDERERS, help="of all scenes (each has the one that is drawn for it)")
     parser.add_argument("--fresh", action="store_true", help="measure all anew, keep no rows")
     parser.add_argument("--cache", type=Path, default=_CACHE, metavar="FOLDER", help="of rows that are kept")
     parser.add_argument("--results", type=Path, default=_RESULTS, metavar="FOLDER", help="of the tables as JSON")

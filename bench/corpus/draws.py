@@ -66,7 +66,7 @@ class Scene:
         size: of the images, width and height, px.
         rate_hz: pulses per second.
         pulses: hill pulses that are rendered.
-        renderer: "hill" or "drawn".
+        renderer: "hill" or "drawn"; "path-traced" where that is asked for.
         marker_px: median radius of the markers in the images, px.
     """
 

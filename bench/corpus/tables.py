@@ -36,6 +36,7 @@ GROUPS: Final[dict[str, Callable[[Row], bool]]] = {
     ),
     "pictures of the simulated hill": lambda row: row.renderer == "hill",
     "drawn pictures": lambda row: row.renderer == "drawn",
+    "path-traced pictures": lambda row: row.renderer == "path-traced",
 }
 
 #: By name: of each scene what is counted, and out of how much.

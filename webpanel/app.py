@@ -1,12 +1,9 @@
 """The web application of the panel: puts routes, guard, documentation and page together."""
 
-import mimetypes
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 from importlib.metadata import version
-from importlib.resources import files
-from typing import Final
 
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
@@ -22,6 +19,7 @@ from webpanel.door.links import Links
 from webpanel.door.logins import Door, Sessions
 from webpanel.door.spellings import Spellings
 from webpanel.door.streams import OpenStreams
+from webpanel.page_files import serve_page
 from webpanel.problems import handle_errors
 from webpanel.routes.alarms import alarms_router
 from webpanel.routes.athletes import athletes_router
@@ -41,12 +39,6 @@ from webpanel.routes.recordings import recordings_router
 from webpanel.routes.rig import rig_router
 from webpanel.routes.start_list import start_list_router
 from webpanel.routes.trash import trash_router
-
-#: The media types of the page's files; the computer's own table may lack some or have others.
-_TYPES: Final = {
-    ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".png": "image/png",
-    ".json": "application/json", ".webmanifest": "application/manifest+json", ".woff2": "font/woff2",
-}  # fmt: skip
 
 
 def create_app(
@@ -107,22 +99,15 @@ def create_app(
         app.include_router(router)
     routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
     handle_errors(app, routes)
+    serve_page(app, "/index.html")
     app.add_middleware(
         Guard, door=door, note=lambda said: service.tell("info", "access", said), visit=visiting(service)
     )
     app.add_middleware(Spellings, heads=[route.path_regex for route in routes if "HEAD" in (route.methods or ())])
     app.add_middleware(CountRequests, metrics=metrics)
     serve_documentation(app, access)
-    serve_page(app)
     return app
 
 
 def _nothing_to_measure(recording: str) -> DeskFiles:
     raise UnknownRecordingError(f"recording {recording!r} cannot be measured by hand here")
-
-
-def serve_page(app: FastAPI) -> None:
-    """Serve the files of the page."""
-    for suffix, media_type in _TYPES.items():
-        mimetypes.add_type(media_type, suffix)
-    app.frontend("/", directory=str(files("webpanel") / "page"), fallback=None)

@@ -9,11 +9,11 @@ from fastapi.responses import RedirectResponse
 from fastapi.routing import APIRoute
 
 from analysis.digitizing.desks import Desks
-from webpanel.app import serve_page
 from webpanel.door.access import Access
 from webpanel.door.guard import Guard
 from webpanel.door.logins import Door
 from webpanel.door.streams import OpenStreams
+from webpanel.page_files import serve_page
 from webpanel.problems import handle_errors
 from webpanel.routes.common import COMMON
 from webpanel.routes.digitizing import digitizing_router
@@ -47,11 +47,11 @@ def create_digitizing_app(desks: Desks, access: Access, page: str) -> FastAPI:
     for router in routers:
         app.include_router(router)
     handle_errors(app, [route for router in routers for route in router.routes if isinstance(route, APIRoute)])
+    serve_page(app)
     app.add_middleware(Guard, door=door, note=unheard, visit=unheard)
 
     @app.get("/", include_in_schema=False)
     def lead() -> RedirectResponse:
         return RedirectResponse(page)
 
-    serve_page(app)
     return app

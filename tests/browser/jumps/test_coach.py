@@ -203,7 +203,8 @@ def test_a_link_is_taken_back_on_the_page_of_its_jump(hill: Hill, open_page: Ope
 def test_the_delayed_picture_takes_bounded_memory_and_keeps_its_time(hill: Hill, open_page: Open) -> None:
     page = open_page(f"{hill.url}/#/jump/none")
     found = page.evaluate("""async () => {
-        const { makeDelay, BYTES_MAX } = await import("/jump/delayed.js");
+        const main = document.querySelector("script").src;
+        const { makeDelay, BYTES_MAX } = await import(main.replace("main.js", "jump/delayed.js"));
         let now = 0;
         const delay = makeDelay(() => now);
         const most = { pictures: 0, bytes: 0 };

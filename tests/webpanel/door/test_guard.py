@@ -80,7 +80,7 @@ def test_the_own_page_may_change_things(panel: Panel, client: httpx.Client) -> N
 
 
 def test_every_answer_is_guarded(client: httpx.Client) -> None:
-    for path in ("/", "/api/status", "/api/nothing", "/metrics", "/docs", "/main.js"):
+    for path in ("/", "/api/status", "/api/nothing", "/metrics", "/docs", "/digitize.html"):
         headers = client.get(path).headers
         assert headers["content-security-policy"].startswith("default-src 'none'; ")
         assert "frame-ancestors 'none'" in headers["content-security-policy"]
@@ -92,7 +92,7 @@ def test_every_answer_is_guarded(client: httpx.Client) -> None:
         assert "server" not in headers
     assert "'unsafe" not in client.get("/").headers["content-security-policy"]
     assert client.get("/api/status").headers["cache-control"] == "no-store"
-    assert client.get("/main.js").headers["cache-control"] == "no-cache"
+    assert client.get("/").headers["cache-control"] == "no-cache"
 
 
 def test_without_the_token_only_the_page_is_seen(stranger: httpx.Client) -> None:

@@ -323,7 +323,7 @@ WRONG_METHODS = [
     ("TRACE", "/api/status", "GET, HEAD"),
     ("PUT", "/api/recordings", "GET, HEAD, POST"),
     ("OPTIONS", "/api/recordings/x", "DELETE, GET, HEAD, PATCH"),
-    ("POST", "/main.js", "GET, HEAD"),
+    ("POST", "/index.html", "GET, HEAD"),
 ]
 
 

@@ -1,7 +1,7 @@
 /** Calls the REST API. Every failure is thrown as a Problem, whose message says what to do. */
 
-/** Where the API is, from the page as well as from a worker. */
-export const API = new URL("../api/", import.meta.url).href;
+/** Where the API is, from the page as well as from a worker: this module stands at page/VERSION/shared/. */
+export const API = new URL("../../../api/", import.meta.url).href;
 const DEADLINE_MS = 10_000;
 
 /** @typedef {{ code: string, text: string, values?: import("./types.js").Values }} Said */

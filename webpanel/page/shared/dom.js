@@ -1,6 +1,8 @@
 /** Makes and changes elements of the page. */
 
 const SVG = "http://www.w3.org/2000/svg";
+/** The drawings of icons. It stands with this module, at an address that names their version. */
+const ICONS = new URL("../icons.svg", import.meta.url).pathname;
 
 /**
  * The element of index.html with this id.
@@ -55,7 +57,7 @@ export function icon(name) {
  */
 export function setIcon(svg, name) {
   const use = svg?.querySelector("use");
-  const target = `./icons.svg#${name}`;
+  const target = `${ICONS}#${name}`;
   if (use && use.getAttribute("href") !== target) use.setAttribute("href", target);
 }
 

@@ -42,6 +42,7 @@ from service.measuring.queue import Measurings
 from service.recordings.archive import Archive
 from service.recordings.describing import as_recording
 from service.recordings.in_progress import Outcome
+from service.recordings.measured_jumps import MeasuredJumps
 from service.recordings.trash_keeper import TrashKeeper
 from service.rehearsals import Rehearser
 from service.seam.cameras import CloseUp, Preview
@@ -70,6 +71,7 @@ class Service(Archive):
         catalogue: of the folder of the recordings.
         exports: of these recordings.
         measurings: measures these recordings.
+        jumps: that were measured in them.
         keeper: looks after the trash of this folder.
         slot: shared memory with the newest triplet.
         rehearser: makes rehearsals of the rig.
@@ -88,6 +90,7 @@ class Service(Archive):
         catalogue: Catalogue,
         exports: Exports,
         measurings: Measurings,
+        jumps: MeasuredJumps,
         keeper: TrashKeeper,
         slot: PreviewSlot,
         rehearser: Rehearser,
@@ -97,7 +100,7 @@ class Service(Archive):
         calibrating: CalibrationHelper,
         examine: Callable[[Status, bool | None], DoctorReport],
     ) -> None:
-        super().__init__(catalogue, exports, measurings)
+        super().__init__(catalogue, exports, measurings, jumps)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
         self._slot, self._rehearser, self._examine = slot, rehearser, examine
         self._lights, self._trains, self._balls, self._calibrating = lights, trains, balls, calibrating

@@ -1,7 +1,7 @@
 """Writes the files of a result anew that say whose jump it is, when that was corrected; nothing is measured again."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -33,7 +33,7 @@ def write_renamed(
     out: Path,
     corrected: Mapping[str, str],
     *,
-    earlier: Callable[[str], Sequence[EarlierJump]],
+    earlier: Sequence[EarlierJump],
 ) -> None:
     """Write the files that say whose jump it is (`analysis.result.naming.bears_names`), with the corrected session.
 
@@ -42,7 +42,7 @@ def write_renamed(
         log: that was measured.
         out: folder to write to, made if it does not exist.
         corrected: fields of the session that are others now.
-        earlier: gives the measured jumps of an athlete, for the marks of the kinogram.
+        earlier: other measured jumps of the athlete, for the marks of the kinogram.
 
     Raises:
         BadInputError: a file of the result, or the log cannot be read; an older svev has no `CAMERAS`.
@@ -56,8 +56,7 @@ def write_renamed(
         out.mkdir(parents=True, exist_ok=True)
         content = read_json(folder / result_file.NAME, "result") | {"session": dict(result.session)}
         result_file.write_json(content, out / result_file.NAME)
-        own = earlier(result.session.get("athlete", ""))
-        write_kinograms(result, measurements, system, log, out, perpendicular=across, earlier=own)
+        write_kinograms(result, measurements, system, log, out, perpendicular=across, earlier=earlier)
     except OSError as error:
         raise StorageError(f"{out}: cannot be written ({error.strerror}); make room") from error
     write_report(result, measurements, system, log, out / _REPORT, perpendicular=across)

@@ -1,7 +1,7 @@
 """Takes the steps with a log after its end: programs of their own measure and copy it; keeps what came of it."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -39,6 +39,7 @@ class AfterSteps:
     Args:
         folder: of the recordings.
         busy: whether a recording runs, so that the work has to stand still.
+        earlier: gives the `kinogram.json` of the other measured logs of whoever jumps in a recording.
         wanted: whether the steps of a recording are still wanted.
         hear: takes how far the work is.
         hold: called with True when it stands still, with False when it goes on.
@@ -50,13 +51,14 @@ class AfterSteps:
         self,
         folder: Path,
         busy: Callable[[], bool],
+        earlier: Callable[[str], Sequence[Path]],
         wanted: Callable[[str], bool],
         hear: Callable[[dict[str, Any]], None],
         hold: Callable[[bool], None],
         tell: Callable[[Event], None],
         found: Callable[[tuple[LastJump, ...]], None],
     ) -> None:
-        self._folder, self._busy, self._wanted = folder, busy, wanted
+        self._folder, self._busy, self._earlier, self._wanted = folder, busy, earlier, wanted
         self._hear, self._hold, self._tell, self._found = hear, hold, tell, found
 
     def tidy(self) -> None:
@@ -83,6 +85,7 @@ class AfterSteps:
                 "video": str(video) if wants_video else None,
                 "survey": analysis.survey and str(analysis.survey),
                 "calibration": analysis.calibration and str(analysis.calibration),
+                "earlier": [str(path) for path in self._earlier(recording)],
             }
 
             def hear(news: dict[str, Any]) -> None:
@@ -124,7 +127,8 @@ class AfterSteps:
         try:
             make_folder(made.parent)
             shutil.rmtree(made, ignore_errors=True)
-            asked = {"log": str(log), "result": str(measured_path(log)), "out": str(made)}
+            earlier = [str(path) for path in self._earlier(recording)]
+            asked = {"log": str(log), "result": str(measured_path(log)), "out": str(made), "earlier": earlier}
             end = self._child(recording, "service.measuring.renaming", asked, self._hear)
             if end is None or not log.exists():
                 return False

@@ -43,8 +43,7 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     except SvevError as error:
         return _failed(error, by_source=orienting)
     result = found.result
-    earlier = earlier_jumps(log, result.session.get("athlete", ""))
-    write_folder(found, log, out, earlier=earlier, progress=progress)
+    write_folder(found, log, out, earlier=earlier_jumps(asked["earlier"]), progress=progress)
     jumps = [
         summary(result.recording, result.rate_hz, jump, found.perpendicular.get(jump.number)) for jump in result.jumps
     ]

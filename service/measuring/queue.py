@@ -5,7 +5,7 @@ for. None is forgotten: a service that was killed, or a computer without power, 
 """
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
@@ -48,6 +48,7 @@ class Measurings:
         folder: folder of the recordings.
         in_use: gives the rig in use, whose `[analysis]` says where the balls or the cameras are.
         busy: whether a recording runs.
+        earlier: gives the `kinogram.json` of the other measured logs of whoever jumps in a recording.
         tell: takes an event for the live log.
         found: takes the main figures of the jumps of a log, when it is measured.
         changed: called when something has changed that people see.
@@ -58,6 +59,7 @@ class Measurings:
         folder: Path,
         in_use: Callable[[], RigSettings],
         busy: Callable[[], bool],
+        earlier: Callable[[str], Sequence[Path]],
         tell: Callable[[Event], None],
         found: Callable[[tuple[LastJump, ...]], None],
         changed: Callable[[], None],
@@ -69,7 +71,7 @@ class Measurings:
         self._at = self._waiting  # what the log stands in that is at work
         self._retries = Retries(folder, in_use)
         self._running: MeasuringQueue | None = None
-        self._after = AfterSteps(folder, busy, self._wanted, self._hear, self._hold, tell, found)
+        self._after = AfterSteps(folder, busy, earlier, self._wanted, self._hear, self._hold, tell, found)
         self._lock = threading.Lock()
         self._bell, self._closed = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="measuring", daemon=True)

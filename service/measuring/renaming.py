@@ -1,6 +1,5 @@
 """The program that writes a corrected name into a result, started by `service.measuring.after_steps`."""
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,8 @@ def _rename(asked: dict[str, Any], _: Teller) -> dict[str, Any]:
     from service.measuring.earlier import earlier_jumps  # noqa: PLC0415
 
     log = Path(asked["log"])
-    changes, earlier = session_changes(log), partial(earlier_jumps, log)
-    write_renamed(Path(asked["result"]), log, Path(asked["out"]), changes, earlier=earlier)
+    earlier = earlier_jumps(asked["earlier"])
+    write_renamed(Path(asked["result"]), log, Path(asked["out"]), session_changes(log), earlier=earlier)
     return {}
 
 

@@ -22,6 +22,7 @@ from service.recordings.describing import Chain, as_pulses, as_recording
 from service.recordings.digitized import digitized_downloads
 from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find
+from service.recordings.measured_jumps import MeasuredJumps
 from service.seam.archive import Download, FoundRecordings
 
 _ALL: Final = RecordingQuery()
@@ -37,10 +38,11 @@ class Archive(ArchiveResults, ArchiveNotes):
         catalogue: of the folder.
         exports: of the same recordings.
         measurings: likewise.
+        jumps: that were measured in them.
     """
 
-    def __init__(self, catalogue: Catalogue, exports: Exports, measurings: Measurings) -> None:
-        ArchiveResults.__init__(self, catalogue, measurings)
+    def __init__(self, catalogue: Catalogue, exports: Exports, measurings: Measurings, jumps: MeasuredJumps) -> None:
+        ArchiveResults.__init__(self, catalogue, measurings, jumps)
         ArchiveNotes.__init__(self, catalogue)
         self.exports = exports
         self._checksums: dict[str, str] = {}

@@ -25,11 +25,11 @@ class ArchiveResults(ABC):
     Args:
         catalogue: of the folder.
         measurings: of the same recordings.
+        jumps: that were measured in them.
     """
 
-    def __init__(self, catalogue: Catalogue, measurings: Measurings) -> None:
-        self._catalogue, self._measurings = catalogue, measurings
-        self._jumps = MeasuredJumps(catalogue.directory)
+    def __init__(self, catalogue: Catalogue, measurings: Measurings, jumps: MeasuredJumps) -> None:
+        self._catalogue, self._measurings, self._jumps = catalogue, measurings, jumps
         self._comparisons = Comparisons(catalogue.directory, lambda: self.status().recording is not None)
 
     @abstractmethod
@@ -53,11 +53,11 @@ class ArchiveResults(ABC):
 
     def athletes(self) -> list[Athlete]:
         """Whose jumps were measured, by name."""
-        return athletes(self._jumps.of(self._catalogue.entries()))
+        return athletes(self._jumps.all())
 
     def measured_jumps(self, query: JumpQuery) -> list[AthleteJump]:
         """The measured jumps that a query finds, newest first; none that lies in the trash."""
-        return wanted(self._jumps.of(self._catalogue.entries()), query)
+        return wanted(self._jumps.all(), query)
 
     def compare_spans(self, athlete: str, first: Span, second: Span) -> Comparison:
         """Whether an athlete's jumps of two spans of time differ by more than chance.

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from analysis.report.kinogram.earlier import NAME as KINOGRAM
 from recorder.catalogue.entry import SUFFIX, Entry
+from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.index_file import FileKey, file_key
 from recorder.log.jumper_path import jumper_path
+from recorder.log.measured_path import measured_path
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery, folded
 from rig.api.jump import LastJump
 from rig.api.statement import Level
@@ -42,21 +45,42 @@ class MeasuredJumps:
     """Any thread may call any method.
 
     Args:
-        directory: folder of the recordings.
+        catalogue: of the folder of the recordings.
     """
 
-    def __init__(self, directory: Path) -> None:
-        self._directory = directory
+    def __init__(self, catalogue: Catalogue) -> None:
+        self._catalogue, self._directory = catalogue, catalogue.directory
         self._known: dict[str, _Known] = {}
         self._lock = threading.Lock()
 
-    def of(self, entries: Iterable[Entry]) -> list[AthleteJump]:
-        """The measured jumps of recordings that lie in the folder itself, newest first."""
-        with self._lock:
-            known = {entry.id: self._look(entry) for entry in entries}
-            self._known = known
-        jumps = [jump for each in known.values() for jump in each.jumps]
+    def all(self) -> list[AthleteJump]:
+        """The measured jumps of the recordings that lie in the folder itself, not in the trash, newest first.
+
+        Raises:
+            StorageError: the folder cannot be read.
+        """
+        jumps = [jump for each in self._look_at_all().values() for jump in each.jumps]
         return sorted(jumps, key=lambda each: (each.jump.time, each.jump.recording, each.jump.jump), reverse=True)
+
+    def others_of_athlete(self, recording: str) -> list[Path]:
+        """The `kinogram.json` of the other measured logs of whoever jumps in a recording; none without a name.
+
+        Raises:
+            StorageError: the folder cannot be read.
+        """
+        known = self._look_at_all()
+        own = _athlete(known[recording].entry) if recording in known else ""
+        return [
+            measured_path(self._directory / f"{name}{SUFFIX}") / KINOGRAM
+            for name, each in known.items()
+            if own and name != recording and any(jump.level is not Level.INFO for jump in each.jumps)
+            if _athlete(each.entry) == own
+        ]
+
+    def _look_at_all(self) -> dict[str, _Known]:
+        with self._lock:
+            self._known = {entry.id: self._look(entry) for entry in self._catalogue.entries()}
+            return self._known
 
     def _look(self, entry: Entry) -> _Known:
         before, log = self._known.get(entry.id), self._directory / f"{entry.id}{SUFFIX}"
@@ -117,6 +141,10 @@ def _of_athlete(entry: Entry, jump: LastJump, *, live: bool) -> AthleteJump:
         level=Level.INFO if live else Level.GOOD if jump.ok else Level.WARNING,
         jump=jump.model_copy(update={"recording": entry.id}),
     )
+
+
+def _athlete(entry: Entry) -> str:
+    return folded(entry.session.get("athlete", ""))
 
 
 def _key(path: str) -> FileKey | None:

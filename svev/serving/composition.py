@@ -43,6 +43,7 @@ from service.lights import Lights
 from service.measuring.queue import Measurings
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
+from service.recordings.measured_jumps import MeasuredJumps
 from service.recordings.storage import usable_bytes
 from service.recordings.trash_keeper import TrashKeeper
 from service.regions import Regions
@@ -119,7 +120,7 @@ def serve(settings: ServiceSettings) -> None:
         notify = stack.enter_context(closing(Notify()))
         slot = stack.enter_context(closing(PreviewSlot.create(rig.triplet_shape, len(rig.cameras))))
         hub, catalogue = EventHub(write_line), Catalogue(data)
-        options = RecorderOptions(directory=data, preroll_s=preroll_s, preview=slot.fd)
+        jumps, options = MeasuredJumps(catalogue), RecorderOptions(directory=data, preroll_s=preroll_s, preview=slot.fd)
         jumpers = JumperBook(Keeper(data, hub.tell), hub.wake)
         supervisor = Supervisor(rig, rig_toml, hub, options, jumpers=jumpers)
         keeper = stack.enter_context(TrashKeeper(lambda: supervisor.rig, catalogue, hub.tell))
@@ -133,8 +134,8 @@ def serve(settings: ServiceSettings) -> None:
         trains = Trains(supervisor, settings.rig, preroll_s)
         balls = BallPlaces(lambda: supervisor.rig, data)
         service = Service(
-            supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor)), keeper, slot,
-            rehearser, lights, trains, balls,
+            supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor, jumps)), jumps,
+            keeper, slot, rehearser, lights, trains, balls,
             stack.enter_context(closing(_calibrating(settings.rig, data, supervisor, slot))),
             PanelDoctor(lambda: supervisor.rig, data).report,
         )  # fmt: skip
@@ -209,7 +210,7 @@ def _calibrating(rig_file: Path, data: Path, supervisor: Supervisor, slot: Previ
     return CalibrationHelper(data, lambda: supervisor.rig, slot.fd, busy, CalibrationKeeper(supervisor, rig_file))
 
 
-def _measurings(data: Path, supervisor: Supervisor) -> Measurings:
+def _measurings(data: Path, supervisor: Supervisor, jumps: MeasuredJumps) -> Measurings:
     """Measures the logs of the recordings, and stands still while a recording runs."""
 
     def busy() -> bool:
@@ -219,7 +220,8 @@ def _measurings(data: Path, supervisor: Supervisor) -> Measurings:
         with suppress(ProcessDiedError):  # the service ends; the result is on the disk
             supervisor.commands.ask(at_once(partial(supervisor.know_jumps, jumps)), _SOON_S)
 
-    made = Measurings(data, lambda: supervisor.rig, busy, supervisor.hub.tell, found, supervisor.hub.wake)
+    earlier, hub = jumps.others_of_athlete, supervisor.hub
+    made = Measurings(data, lambda: supervisor.rig, busy, earlier, hub.tell, found, hub.wake)
     supervisor.recordings.on_log = made.opened
     return made
 

@@ -58,6 +58,7 @@ from service.jumpers.book import JumperBook
 from service.measuring.queue import Measurings
 from service.recordings.archive import Archive
 from service.recordings.describing import as_recording
+from service.recordings.measured_jumps import MeasuredJumps
 from service.seam.cameras import CloseUp, Preview
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import check_seen, check_stop, tap_guard
@@ -104,8 +105,11 @@ class MemoryService(Archive):
     def __init__(self, folder: Path) -> None:
         self.catalogue = Catalogue(folder)
         self.settings = SIM
-        self.measurings = Measurings(folder, lambda: self.settings, self._busy, lambda _: None, self._found, self._wake)
-        super().__init__(self.catalogue, Exports(folder, self._busy, lambda: 1e12), self.measurings)
+        jumps = MeasuredJumps(self.catalogue)
+        self.measurings = Measurings(
+            folder, lambda: self.settings, self._busy, jumps.others_of_athlete, lambda _: None, self._found, self._wake
+        )
+        super().__init__(self.catalogue, Exports(folder, self._busy, lambda: 1e12), self.measurings, jumps)
         self.state = State.IDLE
         self.survey: Path | None = None
         self.well = True

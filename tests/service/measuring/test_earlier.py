@@ -1,48 +1,61 @@
-"""Which jumps of the folder a jump is compared with."""
+"""Which jumps of the folder a jump is compared with: those that the athlete's page has."""
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from recorder.catalogue.folder import Catalogue
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import write_session_changes
+from rig.api.jump import LastJump
 from service.measuring.earlier import earlier_jumps
+from service.measuring.results import keep_result
+from service.recordings.measured_jumps import MeasuredJumps
+from tests.recorder.logs import ALL_OK, write_log
+
+TIME = datetime(2026, 2, 14, 10, 15, 30, tzinfo=UTC)
 
 
 def _measured(folder: Path, recording: str, athlete: str, speed: float) -> Path:
     log = folder / f"{recording}.mcap"
-    log.touch()
-    measured_path(log).mkdir()
+    write_log(log, (ALL_OK,))
+    write_session_changes(log, {"athlete": athlete})
+    made = folder / "made"
+    made.mkdir()
     jump = {
-        "time": "2026-02-14T10:15:30+00:00",
+        "time": TIME.isoformat(),
         "ok": True,
         "figures": {"takeoff_speed": {"value": speed, "sigma": 0.01}, "v_angle": None},
     }
     content = {"format": "svev-kinogram/1", "recording": recording, "athlete": athlete, "jumps": [jump]}
-    (measured_path(log) / "kinogram.json").write_text(json.dumps(content))
+    (made / "kinogram.json").write_text(json.dumps(content))
+    keep_result(made, log, (LastJump(recording=recording, jump=1, time=TIME, ok=True, verdict="measured well"),))
     return log
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Four measured jumps, and a log that nobody has measured."""
+    """Four measured jumps, and a log of the first athlete that nobody has measured."""
     for order, athlete in enumerate(("Anna Berg", "anna  berg ", "Ola", ""), 1):
         _measured(tmp_path, f"jump-{order}", athlete, 25.0 + order)
-    (tmp_path / "fresh.mcap").touch()
+    write_log(tmp_path / "fresh.mcap", (ALL_OK,))
+    write_session_changes(tmp_path / "fresh.mcap", {"athlete": "ANNA BERG"})
     return tmp_path
 
 
-def _speeds(folder: Path, athlete: str = "Anna Berg", log: str = "fresh") -> list[float]:
-    return [jump.figures["takeoff_speed"].value for jump in earlier_jumps(folder / f"{log}.mcap", athlete)]
+def _speeds(folder: Path, log: str = "fresh") -> list[float]:
+    files = MeasuredJumps(Catalogue(folder)).others_of_athlete(log)
+    return sorted(jump.figures["takeoff_speed"].value for jump in earlier_jumps(map(str, files)))
 
 
 def test_only_the_athletes_other_jumps(folder: Path) -> None:
     assert _speeds(folder) == [26.0, 27.0]
-    assert _speeds(folder, log="jump-1") == [27.0]
-    assert _speeds(folder, "") == []  # jumps without a name are of different people
-    assert _speeds(folder, "Kari") == []
-    assert earlier_jumps(folder / "fresh.mcap", "Anna Berg")[0].figures.keys() == {"takeoff_speed"}
+    assert _speeds(folder, "jump-1") == [27.0]
+    assert _speeds(folder, "jump-3") == []
+    assert _speeds(folder, "jump-4") == [], "jumps without a name are of different people"
+    assert _speeds(folder, "gone") == []
 
 
 def test_a_corrected_name_counts(folder: Path) -> None:
@@ -51,7 +64,8 @@ def test_a_corrected_name_counts(folder: Path) -> None:
     assert _speeds(folder) == [27.0, 28.0]
 
 
-def test_a_result_without_its_log_and_broken_files_are_left_out(folder: Path) -> None:
-    (folder / "jump-1.mcap").unlink()
+def test_what_is_in_the_trash_and_broken_files_are_left_out(folder: Path) -> None:
+    Catalogue(folder).delete("jump-1")
+    assert _speeds(folder) == [27.0]
     (measured_path(folder / "jump-2.mcap") / "kinogram.json").write_text("{")
     assert _speeds(folder) == []

@@ -13,6 +13,7 @@ import av
 import pytest
 from pydantic import ValidationError
 
+from analysis.report.kinogram.earlier import read_earlier
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from recorder.catalogue.folder import Catalogue
 from recorder.log.measured_path import measured_path
@@ -22,10 +23,10 @@ from rig.api.measuring import Measurement, MeasuringState
 from rig.errors import StateForbidsError
 from rig.events import Event
 from rig.settings.model import AnalysisSettings
-from service.measuring.earlier import earlier_jumps
 from service.measuring.queue import Measurings
 from service.measuring.waiting import NAME
 from service.recordings import live_results
+from service.recordings.measured_jumps import MeasuredJumps
 from tests.analysis.simulated import training
 from tests.recorder.logs import write_log
 from tests.support.rigs import SIM
@@ -65,7 +66,10 @@ class Bench:
         """A service that measures."""
         analysis = self.survey and AnalysisSettings(survey=self.survey, **self.further)
         rig = SIM.model_copy(update={"analysis": analysis})
-        with Measurings(self.folder, lambda: rig, lambda: self.busy, self._hear, self._know, lambda: None) as queue:
+        earlier = MeasuredJumps(Catalogue(self.folder)).others_of_athlete
+        with Measurings(
+            self.folder, lambda: rig, lambda: self.busy, earlier, self._hear, self._know, lambda: None
+        ) as queue:
             yield queue
 
     def log(self, recording: str) -> Path:
@@ -117,7 +121,7 @@ def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside
     assert abs(jump.takeoff_speed.value - 26.1) < 1.0
     assert {"report.html", "jumper.c3d", "jumper.trc", "jumper.csv", "jumper.json", "protocol.html"} <= set(done.files)
     assert {"kinogram.html", "kinogram.jpg", "kinogram.json"} <= set(done.files)
-    assert [earlier.ok for earlier in earlier_jumps(bench.log("next"), "anna  berg")] == [True]
+    assert [earlier.ok for earlier in read_earlier(measured_path(bench.log("jump")))] == [True]
     assert live_results.latest(bench.folder) == jump
     _a_corrected_name_reaches_every_file(bench)
     assert live_results.takeoff_pulse(bench.log("jump")) == pytest.approx(30 - 16 + 1, abs=1)
@@ -153,7 +157,7 @@ def _a_corrected_name_reaches_every_file(bench: Bench) -> None:
     write_session_changes(log, {"athlete": "Berit", "note.3": "of a pulse"})  # while no service runs
     with bench.running() as queue:
         wait_until(lambda: not bench.of(queue, "jump").renaming, "the service that starts finds it", PATIENCE_S, 0.05)
-    assert [earlier.athlete for earlier in earlier_jumps(bench.log("next"), "berit")] == ["Berit"]
+    assert [earlier.athlete for earlier in read_earlier(folder)] == ["Berit"]
 
 
 def _a_failure_leaves_the_result(bench: Bench) -> None:

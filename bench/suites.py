@@ -28,6 +28,7 @@ from bench.results import write_results
 from bench.service.api import run_api
 from bench.service.catalogue import run_catalogue
 from bench.service.listing import run_listing
+from bench.service.training import run_trainings
 from bench.triggering.pairing import pairing_table, run_pairing
 from recorder.publishing.subscriber import free_address
 
@@ -145,6 +146,27 @@ def _pairing(pulses: int, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": pairing_table(cases)}
 
 
+def _training(jumpers: int, directory: Path) -> dict[str, Any]:
+    cases = run_trainings(jumpers, directory)
+    path = write_results("training", cases, directory)
+    table = []
+    for case in cases:
+        missing = ", ".join(f"{count} {cause}" for cause, count in case["frames_missing"].items())
+        table.append(
+            f"{case['name']}: {case['recordings']} logs of {case['jumpers']} jumpers, {case['right_names']} names "
+            f"right, {case['complete']} of {case['pulses']} pulses complete; frames missing: {missing}"
+        )
+        if "measured" in case:
+            takeoff, pulse = case["after_takeoff_s"] or {}, case["after_last_pulse_s"] or {}
+            table.append(
+                f"  {case['measured']} measured, {case['measured_well']} well, {case['right_pages']} pages under the "
+                f"right name, {case['still_waiting']} still waiting; figures and kinogram after the take-off, median "
+                f"and most: {takeoff.get('median')} and {takeoff.get('most')} s, after the last pulse: "
+                f"{pulse.get('median')} and {pulse.get('most')} s"
+            )
+    return {"cases": cases, "file": str(path), "table": table}
+
+
 def _smoothing(draws: int, directory: Path) -> dict[str, Any]:
     cases = run_smoothing(draws)
     path = write_results("smoothing", cases, directory)
@@ -190,3 +212,5 @@ SUITES: dict[str, Suite] = {
 DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing, "jump-repeats": _repeats, "gross-errors": _gross_errors}
 #: Suites that fire a number of simulated pulses.
 FIRED: dict[str, DrawnSuite] = {"pairing": _pairing}
+#: Suites in which a number of jumpers jump.
+JUMPED: dict[str, DrawnSuite] = {"training": _training}

@@ -1,20 +1,18 @@
 """A training that nobody touches: recorded by motion, named by the start list, measured by itself, or not measured.
 
-Run it on a quiet machine: `python -m bench.service.training --jumpers 20 --out FOLDER`. It writes `training.json`:
-whether every jump has its log, its name and its result, how long after the take-off the figures are there, and which
-frames the analysis cost. Both halves record the same jumps of the simulated hill with three simulated GigE cameras.
+Both halves record the same jumps of the simulated hill with three simulated GigE cameras on a quiet machine: whether
+every jump has its log, its name and its pages, when the figures are there, and which frames the analysis costs.
 """
 
-import argparse
 import json
 import shutil
 import time
-from datetime import datetime
+from collections import Counter
+from datetime import datetime, timedelta
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from bench.results import write_results
 from bench.service.serving import ServedRig, served_rig
 from rig.errors import ProcessDiedError
 from rig.settings.file import CONFIG
@@ -22,23 +20,30 @@ from simrig.world.scenario import load_scenario
 from simrig.world.survey import survey
 
 _LOOK_S: Final = 0.5
+#: From one jump to the next.
+_EVERY_S: Final = 30.0
 #: Measuring one log takes less, also on a slow computer.
 _MEASURED_S: Final = 300.0
+#: What people look at.
+_PAGES: Final = ("kinogram.html", "report.html")
 
 
-def main() -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--jumpers", type=int, default=20)
-    parser.add_argument("--every", type=float, default=30.0, help="seconds from one jump to the next")
-    parser.add_argument("--out", type=Path, default=Path("bench/results"))
-    arguments = parser.parse_args()
-    cases = [
-        run_training(arguments.jumpers, arguments.every, arguments.out / "training", analysis=analysis)
-        for analysis in (False, True)
-    ]
-    write_results("training", cases, arguments.out)
-    print(json.dumps(cases, indent=2))
+def run_trainings(jumpers: int, directory: Path, every_s: float = _EVERY_S) -> list[dict[str, Any]]:
+    """Record a training without analysis, then the same one with it.
+
+    Args:
+        jumpers: so many jump.
+        directory: where everything is kept meanwhile, and removed afterwards.
+        every_s: from one jump to the next, s.
+
+    Returns:
+        A case of each, as `run_training` gives it.
+
+    Raises:
+        ProcessDiedError: the service ends, or a jump is not recorded or measured in time.
+    """
+    folder = directory / "training"
+    return [run_training(jumpers, every_s, folder, analysis=analysis) for analysis in (False, True)]
 
 
 def run_training(jumpers: int, every_s: float, folder: Path, *, analysis: bool) -> dict[str, Any]:
@@ -51,7 +56,8 @@ def run_training(jumpers: int, every_s: float, folder: Path, *, analysis: bool) 
         analysis: whether the logs are measured.
 
     Returns:
-        Counts of recordings, names, results and frames, and seconds from the take-off to the figures.
+        Counts of recordings, names, results, pages with the right name, frames and logs that still wait at the end;
+        seconds from the take-off and from the last pulse to the figures, with which the pages come.
 
     Raises:
         ProcessDiedError: the service ends, or a jump is not recorded or measured in time.
@@ -67,8 +73,13 @@ def run_training(jumpers: int, every_s: float, folder: Path, *, analysis: bool) 
             service.call("PUT", "/api/automatic", {"on": True})
             recordings = _recorded(service, jumpers, every_s)
             service.call("PUT", "/api/automatic", {"on": False})
-            found = [_measured(service, each["id"]) for each in recordings] if analysis else []
-            return _figures(recordings, found, names) | {"analysis": analysis, "jumpers": jumpers}
+            case = {"name": "measured" if analysis else "not measured", "jumpers": jumpers}
+            case |= _frames(recordings) | {"right_names": _right_names(recordings, names)}
+            if analysis:
+                found = [_measured(service, each["id"]) for each in recordings]
+                case |= _figures(recordings, found) | {"right_pages": _right_pages(service, recordings, names)}
+                case["still_waiting"] = _still_waiting(service)
+            return case
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -111,23 +122,50 @@ def _measured(service: ServedRig, recording: str) -> dict[str, Any]:
         time.sleep(_LOOK_S)
 
 
-def _figures(recordings: list[dict[str, Any]], found: list[dict[str, Any]], names: list[str]) -> dict[str, Any]:
-    frames = {name: sum(each["counts"][name] for each in recordings) for name in ("pulses", "complete", "partial")}
-    waits = [
-        (datetime.fromisoformat(each["measured"]) - datetime.fromisoformat(figure["time"])).total_seconds()
-        for each in found
-        for figure in each["figures"]
-    ]
+def _frames(recordings: list[dict[str, Any]]) -> dict[str, Any]:
+    """How many logs and pulses there are, and which frames are missing, by cause."""
+    missing: Counter[str] = Counter()
+    for each in recordings:
+        missing.update(each["counts"]["causes"])
+    pulses, complete = (sum(each["counts"][name] for each in recordings) for name in ("pulses", "complete"))
+    return {"recordings": len(recordings), "pulses": pulses, "complete": complete, "frames_missing": dict(missing)}
+
+
+def _right_names(recordings: list[dict[str, Any]], names: list[str]) -> int:
+    return sum(each["session"]["athlete"] == name for each, name in zip(recordings, names, strict=True))
+
+
+def _right_pages(service: ServedRig, recordings: list[dict[str, Any]], names: list[str]) -> int:
+    """How many recordings have all pages, each with the name of who jumped."""
+    return sum(
+        all(
+            name in service.call("GET", f"/api/recordings/{each['id']}/measurement/files/{page}").text
+            for page in _PAGES
+        )
+        for each, name in zip(recordings, names, strict=True)
+    )
+
+
+def _still_waiting(service: ServedRig) -> int:
+    """How many logs are being measured or wait for it."""
+    queue = service.json("GET", "/api/status")["measuring"]
+    return int(queue["waiting"]) + (queue["recording"] is not None)
+
+
+def _figures(recordings: list[dict[str, Any]], found: list[dict[str, Any]]) -> dict[str, Any]:
+    measured = [datetime.fromisoformat(each["measured"]) for each in found]
+    ends = [datetime.fromisoformat(each["started"]) + timedelta(seconds=each["duration_s"]) for each in recordings]
+    takeoffs = [[datetime.fromisoformat(figure["time"]) for figure in each["figures"]] for each in found]
     return {
-        "recordings": len(recordings),
-        "right_names": sum(each["session"]["athlete"] == name for each, name in zip(recordings, names, strict=True)),
-        **frames,
         "measured": sum(each["state"] == "done" for each in found),
         "measured_well": sum(any(figure["ok"] for figure in each["figures"]) for each in found),
-        "jumps": sum(len(each["figures"]) for each in found),
-        "figures_after_takeoff_s": {"median": round(median(waits), 1), "most": round(max(waits), 1)} if waits else None,
+        "jumps": sum(map(len, takeoffs)),
+        "after_takeoff_s": _spread(
+            [(at - takeoff).total_seconds() for at, own in zip(measured, takeoffs, strict=True) for takeoff in own]
+        ),
+        "after_last_pulse_s": _spread([(at - end).total_seconds() for at, end in zip(measured, ends, strict=True)]),
     }
 
 
-if __name__ == "__main__":
-    main()
+def _spread(waits: list[float]) -> dict[str, float] | None:
+    return {"median": round(median(waits), 1), "most": round(max(waits), 1)} if waits else None

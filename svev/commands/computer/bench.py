@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from bench.suites import DRAWN, FIRED, SUITES
+from bench.suites import DRAWN, FIRED, JUMPED, SUITES
 from rig.errors import BadInputError
 from svev import console
 
-_NAMES = (*SUITES, *DRAWN, *FIRED)
+_NAMES = (*SUITES, *DRAWN, *FIRED, *JUMPED)
 
 
 def bench(
@@ -29,6 +29,9 @@ def bench(
     pulses: Annotated[
         int, typer.Option(metavar="N", min=100, max=10_000_000, help="pulses of each case of pairing")
     ] = 5000,
+    jumpers: Annotated[
+        int, typer.Option(metavar="N", min=1, max=100, help="jumpers of training; each takes a minute")
+    ] = 5,
     out: Annotated[
         Path,
         typer.Option("-o", "--out", metavar="DIR", help="folder for the results, and for logs that are removed again"),
@@ -63,8 +66,9 @@ def bench(
         console.say(f"{name} ...", aside=True)
         if name in SUITES:
             results[name] = SUITES[name](seconds, out)
-        else:
-            results[name] = DRAWN[name](draws, out) if name in DRAWN else FIRED[name](pulses, out)
+        for counted, number in ((DRAWN, draws), (FIRED, pulses), (JUMPED, jumpers)):
+            if name in counted:
+                results[name] = counted[name](number, out)
     if as_json:
         console.print_json(results)
     else:

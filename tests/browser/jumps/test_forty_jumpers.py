@@ -1,4 +1,4 @@
-"""A training through the page on two phones and a laptop, with fingers that tap twice and pages that are reloaded.
+"""A training through the page on two phones and a laptop: fingers tap twice, pages are reloaded and scrolled anywhere.
 
 The service is real, and so are its processes; the cameras replay a small log, so that nothing but the operators counts.
 """
@@ -56,6 +56,14 @@ def _double_tap(page: Page, button: Locator, apart_ms: int) -> None:
         page.wait_for_timeout(pause_ms)
 
 
+def _scroll(page: Page, share: float) -> None:
+    """Scroll to this share of the page's height, as a finger that reads something has left it."""
+    page.evaluate(
+        "share => scrollTo(0, share * (document.documentElement.scrollHeight - innerHeight))",
+        share,
+    )
+
+
 def _finished(service: Serving, count: int) -> None:
     """Wait until so many recordings are over, and the rig is armed."""
 
@@ -98,14 +106,16 @@ def test_forty_jumpers_forty_names_and_one_tap_for_each(tmp_path: Path, loopback
     rows = [f"{bib};{name}" for bib, name in JUMPERS]
     table.write_bytes("\r\n".join(["bib;athlete", *rows]).encode("utf-16"))
     with _training(tmp_path, loopback) as service:
-        pages = [_phone(open_page, service.url), _phone(open_page, service.url), open_page(service.url)]
-        pages[2].locator("#list-file").set_input_files(table)
-        pages[2].locator("#list-replace").click()
+        laptop = open_page(service.url, width=1024, height=768)
+        pages = [_phone(open_page, service.url), _phone(open_page, service.url), laptop]
+        laptop.locator("#list-file").set_input_files(table)
+        laptop.locator("#list-replace").click()
         for number, (bib, name) in enumerate(JUMPERS, 1):
             page, other = monkey.sample(pages, 2)
             if monkey.random() < 0.2:
                 page.reload()
             expect(page.locator("#next-step[data-step=armed] small")).to_have_text(f"{bib} \N{MIDDLE DOT} {name}")
+            _scroll(page, monkey.random())
             _double_tap(page, page.locator("#save-last"), monkey.choice(QUICK_MS))
             taps += 1
             if monkey.random() < 0.3:

@@ -7,12 +7,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
-import cv2
 import numpy as np
 
-from recorder.importing.grey import grey
+from recorder.importing.decoding import decoded
 from recorder.importing.picture_dates import PictureDates
-from recorder.importing.source import Taken
+from recorder.importing.source import Taken, single_gaps
+from recorder.importing.tiff_damage import damage
 from recorder.importing.tiff_pages import ENDINGS as TIFF_ENDINGS
 from recorder.importing.tiff_tags import page_offsets
 from rig.clocks import UtcNs
@@ -51,9 +51,10 @@ class ImageFolder:
         numbers, step = _frame_numbers(path, names)
         self._names = dict(zip(numbers, names, strict=True))
         self._numbers = range(numbers[0], numbers[-1] + 1, step)
-        whole = next((picture for name in names[:2] if (picture := _read(path / name)) is not None), None)
+        first_ones = [_read(path / name) for name in names[:2]]
+        whole = next((picture for picture in first_ones if not isinstance(picture, str)), None)
         if whole is None:
-            raise BadInputError(f"{path / names[0]}: cannot be read as an image; remove it, or write it again")
+            raise BadInputError(f"{path / names[0]} {first_ones[0]}; remove it, or write it again")
         self.size = (int(whole.shape[1]), int(whole.shape[0]))
         self.bits = 8 * whole.itemsize
         endings = Counter(Path(name).suffix.lower().lstrip(".") for name in names)
@@ -81,24 +82,17 @@ class ImageFolder:
                 f"{self.path}: has no frame {first}: its frames are {self._numbers[0]} to {self._numbers[-1]}"
                 f"{f' in steps of {self._numbers.step}' if self._numbers.step > 1 else ''}; correct --start"
             )
-        unreadable = ""
-        for number in self._numbers[self._numbers.index(first) :]:
-            name = self._names.get(number)
-            if name is None:
-                yield Taken(number, None, FrameStatus.LOST, f"no image in {self.path} has number {number}")
-                continue
-            picture = _read(self.path / name)
-            if picture is not None:
-                self._check(name, picture)
-                yield Taken(number, picture)
-            elif unreadable:
-                raise BadInputError(
-                    f"{self.path}: {unreadable} and {name} cannot be read, one after the other; write them again, or "
-                    "remove them"
-                )
-            else:
-                yield Taken(number, None, FrameStatus.DAMAGED, f"{self.path / name} cannot be read as an image")
-            unreadable = name if picture is None else ""
+        return single_gaps(self._taken(number) for number in self._numbers[self._numbers.index(first) :])
+
+    def _taken(self, number: int) -> Taken:
+        name = self._names.get(number)
+        if name is None:
+            return Taken(number, None, FrameStatus.LOST, f"no image in {self.path} has number {number}")
+        picture = _read(self.path / name)
+        if isinstance(picture, str):
+            return Taken(number, None, FrameStatus.DAMAGED, f"{self.path / name} {picture}")
+        self._check(name, picture)
+        return Taken(number, picture)
 
     def _check(self, name: str, picture: Stored) -> None:
         rows, columns = picture.shape
@@ -155,8 +149,8 @@ def _frame_numbers(path: Path, names: Sequence[str]) -> tuple[list[int], int]:
     return (numbers, step) if regular and few else (in_order, 1)
 
 
-def _read(path: Path) -> Stored | None:
-    """An image without its colours; None if it cannot be read.
+def _read(path: Path) -> Stored | str:
+    """An image without its colours, or why it cannot be read.
 
     Raises:
         BadInputError: the disk does not give it, or its pixels are of a kind that logs do not hold.
@@ -165,17 +159,15 @@ def _read(path: Path) -> Stored | None:
         data = read_whole(path, _MOST_BYTES, links=True)
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions and the disk") from error
-    try:
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-    except cv2.error:
-        return None
-    if picture is None:
-        return None
-    if len(pages := page_offsets(data)[0]) > 1:
+    pages, _ = page_offsets(data)
+    if len(pages) > 1:
         raise BadInputError(
             f"{path}: holds {len(pages)} pages: name the file itself as the film, or write each page as a file"
         )
+    if pages and (found := damage(data, pages[0])):
+        return f"cannot be read as an image: {found}"
     try:
-        return grey(picture)
+        picture = decoded(np.frombuffer(data, np.uint8))
     except ValueError as error:
         raise BadInputError(f"{path}: {error}; write the images with 8 or 16 bits") from None
+    return "cannot be read as an image" if picture is None else picture

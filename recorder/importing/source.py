@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.clocks import UtcNs
+from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.images.pixels import Stored
 
@@ -80,3 +81,23 @@ class Film(Protocol):
             BadInputError: a frame is not as the others are, or there is none of that number.
         """
         ...
+
+
+def single_gaps(frames: Iterator[Taken]) -> Iterator[Taken]:
+    """Pass frames on as long as no two damaged ones follow each other: then the film itself is broken.
+
+    Raises:
+        BadInputError: two frames in a row cannot be read, those apart that are lost.
+    """
+    before: Taken | None = None
+    for each in frames:
+        if each.status is FrameStatus.LOST:
+            yield each
+            continue
+        damaged = each.status is FrameStatus.DAMAGED
+        if damaged and before is not None:
+            raise BadInputError(
+                f"{before.why}, and the frame after it too: {each.why}; write them again, or remove them"
+            )
+        yield each
+        before = each if damaged else None

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-import cv2
 import numpy as np
 
-from recorder.importing.grey import grey
+from recorder.importing.decoding import decoded
 from recorder.importing.picture_dates import PictureDates
-from recorder.importing.source import Taken
+from recorder.importing.source import Taken, single_gaps
+from recorder.importing.tiff_damage import damage
 from recorder.importing.tiff_tags import byte_order, page_offsets
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
@@ -48,10 +48,11 @@ class TiffPages:
         if len(self._file) > _MOST_BYTES:
             raise BadInputError(f"{path}: is larger than 2 GiB: write its pages as files of their own")
         self._offsets, whole = page_offsets(memoryview(self._file))
-        first_pages = (self._page(place) for place in range(min(2, len(self._offsets))))
-        sample = next((page for page in first_pages if page is not None), None)
+        pages = [self._page(place) for place in range(min(2, self.expected))]
+        sample = next((page for page in pages if not isinstance(page, str)), None)
         if sample is None:
-            raise BadInputError(f"{path}: cannot be read as a TIFF file; copy it again, or write it again")
+            why = f" (page 1: {pages[0]})" if pages else ""
+            raise BadInputError(f"{path}: cannot be read as a TIFF file{why}; copy it again, or write it again")
         self.size = (int(sample.shape[1]), int(sample.shape[0]))
         self.bits = 8 * sample.itemsize
         self.kind = f"TIFF file of {self.expected} pages"
@@ -75,39 +76,31 @@ class TiffPages:
             raise BadInputError(
                 f"{self.path}: has no frame {first}: its pages are frames 1 to {self.expected}; correct --start"
             )
-        unreadable = False
-        for number in range(first, self.expected + 1):
-            page = self._page(number - 1)
-            if page is not None:
-                self._check(number, page)
-                yield Taken(number, page)
-            elif unreadable:
-                raise BadInputError(
-                    f"{self.path}: pages {number - 1} and {number} cannot be read, one after the other; write it again"
-                )
-            else:
-                yield Taken(number, None, FrameStatus.DAMAGED, f"page {number} of {self.path} cannot be read")
-            unreadable = page is None
+        return single_gaps(self._taken(number) for number in range(first, self.expected + 1))
 
-    def _page(self, place: int) -> Stored | None:
-        """A page; None if it cannot be read.
+    def _taken(self, number: int) -> Taken:
+        page = self._page(number - 1)
+        if isinstance(page, str):
+            return Taken(number, None, FrameStatus.DAMAGED, f"{self.path}: page {number} cannot be read: {page}")
+        self._check(number, page)
+        return Taken(number, page)
+
+    def _page(self, place: int) -> Stored | str:
+        """A page, or why it cannot be read.
 
         The decoder reads the page that the head of the file names first: in our copy of the head that is this one.
 
         Raises:
             BadInputError: its pixels are of a kind that logs do not hold.
         """
+        if found := damage(memoryview(self._file), self._offsets[place]):
+            return found
         self._file[4:8] = struct.pack(f"{byte_order(memoryview(self._file))}I", self._offsets[place])
         try:
-            page = cv2.imdecode(np.frombuffer(self._file, np.uint8), cv2.IMREAD_UNCHANGED)
-        except cv2.error:
-            return None
-        if page is None:
-            return None
-        try:
-            return grey(page)
+            page = decoded(np.frombuffer(self._file, np.uint8))
         except ValueError as error:
             raise BadInputError(f"{self.path}: {error}; write the pages with 8 or 16 bits") from None
+        return "OpenCV does not understand it" if page is None else page
 
     def _check(self, number: int, page: Stored) -> None:
         rows, columns = page.shape

@@ -18,7 +18,8 @@ Data = bytes | memoryview
 _DATE_TIME, _EXIF = 0x0132, 0x8769
 _ORIGINAL, _DIGITIZED, _SUB_SECONDS, _OFFSET = 0x9003, 0x9004, 0x9291, 0x9011
 _TEXT, _LONG = 2, 4  # types of values that are read
-_ENTRY: Final = 12
+#: Size of an entry of a directory: tag, type, number of values, and the value or its place.
+ENTRY_BYTES: Final = 12
 _ORDERS: Final = {b"II*\0": "<", b"MM\0*": ">"}
 
 
@@ -36,7 +37,7 @@ def page_offsets(data: Data) -> tuple[list[int], bool]:
         (at,) = struct.unpack_from(f"{order}I", data, 4)
         while at and at not in found:
             (count,) = struct.unpack_from(f"{order}H", data, at)
-            (after,) = struct.unpack_from(f"{order}I", data, at + 2 + _ENTRY * count)
+            (after,) = struct.unpack_from(f"{order}I", data, at + 2 + ENTRY_BYTES * count)
             found[at], at = None, after
     except struct.error:
         return list(found), False
@@ -97,7 +98,7 @@ def _directory(data: Data, order: str, at: int) -> Mapping[int, str | int]:
     """
     (count,) = struct.unpack_from(f"{order}H", data, at)
     tags: dict[int, str | int] = {}
-    for place in range(at + 2, at + 2 + _ENTRY * count, _ENTRY):
+    for place in range(at + 2, at + 2 + ENTRY_BYTES * count, ENTRY_BYTES):
         tag, kind, size, value = struct.unpack_from(f"{order}HHII", data, place)
         if kind == _LONG and size == 1:
             tags[tag] = value

@@ -15,7 +15,7 @@ from photogrammetry.network.file import network_from_json
 from photogrammetry.network.model import Network
 from rig.errors import BadInputError
 
-_OPENCV: Final = (".yml", ".yaml", ".json")
+_OPENCV: Final = (".yml", ".yaml", ".json", ".xml")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,8 @@
 """Reads calibrations as OpenCV's FileStorage, ROS and scripts write them: a camera, and its images of a board.
 
 The keys are those of OpenCV's own calibration programs (samples/cpp/calibration.cpp and the tutorial's) and of ROS, in
-YAML or JSON. A key that is not known here may change what the others mean (another lens model, say): it is refused.
+YAML, JSON or XML. A key that is not known here may change what the others mean (another lens model, say): it is
+refused.
 """
 
 from collections.abc import Mapping

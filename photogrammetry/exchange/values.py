@@ -1,11 +1,14 @@
-"""Reads YAML or JSON as tables, lists, numbers, truth values and text; no key twice, nothing guessed.
+"""Reads YAML, JSON or OpenCV's XML as tables, lists, numbers, truth values and text; no key twice, nothing guessed.
 
 A number is one in YAML only as programs write it: `0317` is the number 317, `1_000`, `.nan` and what stands in quotes
 are text. OpenCV's first line (`%YAML:1.0`) is none of YAML's, and its tags (`!!opencv-matrix`) say nothing more.
+In its XML an element is a key, elements called `_` are a list, and words between blanks are one too.
 """
 
+import re
 from pathlib import Path
 from typing import Any, Final
+from xml.etree import ElementTree as ET
 
 import yaml
 
@@ -16,10 +19,13 @@ from rig.settings.strict_toml import read_text
 
 _OPENCV_HEAD: Final = "%YAML:"
 _WORDS: Final = {"true": True, "false": False}
+_XML_ROOT: Final = "opencv_storage"
+_XML_ITEM: Final = "_"
+_XML_WORDS: Final = re.compile(r'"[^"]*"|\S+')
 
 
 def read_values(path: Path, kind: str) -> dict[str, Any]:
-    """Read the table that a YAML or JSON file (by its ending) holds.
+    """Read the table that a YAML, JSON or XML file (by its ending) holds.
 
     Args:
         path: of the file.
@@ -30,6 +36,8 @@ def read_values(path: Path, kind: str) -> dict[str, Any]:
     """
     if path.suffix.lower() == ".json":
         return read_json(path, kind)
+    if path.suffix.lower() == ".xml":
+        return _read_xml(path, kind)
     text = read_text(path, "YAML", f"an existing {kind}")
     try:
         node = yaml.compose(text.partition("\n")[2] if text.startswith(_OPENCV_HEAD) else text, Loader=yaml.BaseLoader)
@@ -68,6 +76,45 @@ def _value(node: yaml.Node, path: Path, seen: set[int]) -> Any:
             table[key] = _value(value_node, path, seen)
         return table
     word = str(node.value)
-    if node.style is not None:  # in quotes
-        return word
+    return word if node.style is not None else _bare(word)  # a style: in quotes
+
+
+def _bare(word: str) -> float | bool | str:
+    """What a word without quotes says."""
     return float(word) if is_written_number(word) else _WORDS.get(word.lower(), word)
+
+
+def _read_xml(path: Path, kind: str) -> dict[str, Any]:
+    text = read_text(path, "XML", f"an existing {kind}")
+    if "<!DOCTYPE" in text:  # its entities may be endless
+        raise BadInputError(f"{path}: has a document type, which OpenCV writes none of; remove <!DOCTYPE ...>")
+    try:
+        root = ET.fromstring(text)  # noqa: S314 - without a document type there is nothing to attack with
+        value = _xml_value(root, path)
+    except (ET.ParseError, RecursionError) as error:
+        raise BadInputError(f"{path}: not valid XML: {error}; correct it there") from None
+    if root.tag != _XML_ROOT or not isinstance(value, dict):
+        raise BadInputError(f"{path}: is no table of keys in <{_XML_ROOT}>; name a {kind}")
+    return value
+
+
+def _xml_value(element: ET.Element, path: Path) -> Any:
+    """What an element of OpenCV's XML holds.
+
+    Raises:
+        BadInputError: a key stands twice, or text beside elements.
+    """
+    inside = list(element)
+    if not inside:
+        words = [each[1:-1] if each[0] == '"' else _bare(each) for each in _XML_WORDS.findall(element.text or "")]
+        return words[0] if len(words) == 1 else words
+    if any((text or "").strip() for text in (element.text, *(each.tail for each in inside))):
+        raise BadInputError(f"{path}: text beside other elements in <{element.tag}>; correct it there")
+    if all(each.tag == _XML_ITEM for each in inside):
+        return [_xml_value(each, path) for each in inside]
+    table: dict[str, Any] = {}
+    for each in inside:
+        if each.tag in table:
+            raise BadInputError(f'{path}: key "{each.tag}" stands twice; remove one')
+        table[each.tag] = _xml_value(each, path)
+    return table

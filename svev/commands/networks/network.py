@@ -28,8 +28,8 @@ def import_command(
         list[Path],
         typer.Argument(
             metavar="FILE",
-            help="COLMAP's folder or text files, OpenCV calibrations (.yml, .json), a PhotoModeler export (.txt), "
-            "files of AICON (.ior, .eor, .phc, .obc), a survey (.csv: name, X, Y, Z, sigma)",
+            help="COLMAP's folder or text files, OpenCV calibrations (.yml, .json, .xml), a PhotoModeler export "
+            "(.txt), files of AICON (.ior, .eor, .phc, .obc), a survey (.csv: name, X, Y, Z, sigma)",
             show_default=False,
         ),
     ],

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 
 from photogrammetry.exchange.importing import Imported, import_network
 from photogrammetry.geometry.camera_model import image_point
-from photogrammetry.network.file_writer import metric_to_pixel
+from photogrammetry.network.file_writer import metric_to_pixel, network_to_json
 from rig.arrays import Floats
 from rig.errors import BadInputError
 
@@ -43,6 +44,23 @@ def _by_opencv(matrix: list[float], lens: list[float], directions: Floats) -> Fl
     rays = np.column_stack((directions, np.ones(len(directions))))
     k = np.array(matrix).reshape(3, 3)
     return np.asarray(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), k, np.array(lens))[0][:, 0])
+
+
+def _by_file_storage(folder: Path, ending: str) -> Path:
+    """As OpenCV's own calibration programs write it."""
+    path = folder / f"K1{ending}"
+    file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    file.write("calibration_time", "Fri Nov 27 12:00:00 2026")
+    file.write("image_width", 640)
+    file.write("image_height", 480)
+    file.write("flags", "")
+    if ending != ".json":  # OpenCV's comments there are no JSON
+        file.writeComment("flags: none")
+    file.write("camera_matrix", np.reshape(MATRIX, (3, 3)))
+    file.write("distortion_coefficients", np.reshape(LENS, (5, 1)))
+    file.write("avg_reprojection_error", 0.25)
+    file.release()
+    return path
 
 
 DIRECTIONS = np.random.default_rng(2).uniform(-0.25, 0.25, (50, 2))
@@ -85,6 +103,7 @@ rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}
         lambda folder: _yaml(folder, BLOCK),
         lambda folder: _yaml(folder, ROS),
         lambda folder: _yaml(folder, "%YAML:1.0\n---\n" + BLOCK),
+        *(partial(_by_file_storage, ending=ending) for ending in (".xml", ".yml", ".yaml", ".json")),
     ],
 )
 def test_the_distortion_is_read_however_it_is_written(write: Callable[[Path], Path], tmp_path: Path) -> None:
@@ -243,3 +262,44 @@ def test_marks_of_photomodeler_keep_their_names(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text(PHOTOMODELER.replace("\n317 4", "\n0317 4"))
     with pytest.raises(BadInputError, match="control point '0317' is there twice"):
         import_network([tmp_path / "a.txt"])
+
+
+def test_images_of_a_board_in_xml_are_those_in_yaml(tmp_path: Path) -> None:
+    draw = np.random.default_rng(3)
+    written: dict[str, Any] = {
+        "image_width": 640,
+        "image_height": 480,
+        "camera_matrix": np.reshape(MATRIX, (3, 3)),
+        "grid_points": draw.random((6, 3)).astype(np.float32),
+        "image_points": (100 * draw.random((2, 6, 2))).astype(np.float32),
+        "extrinsic_parameters": draw.random((2, 6)),
+    }
+    networks = []
+    for ending in (".xml", ".yml"):
+        file = cv2.FileStorage(str(tmp_path / f"K1{ending}"), cv2.FILE_STORAGE_WRITE)
+        for key, value in written.items():
+            file.write(key, value)
+        file.release()
+        networks.append(network_to_json(import_network([tmp_path / f"K1{ending}"]).network))
+    assert networks[0]["observations"]
+    assert networks[0] == networks[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "not valid XML: no element found"),
+        ("<opencv_storage><image_width>640", "not valid XML: no element found: line 1"),
+        ("<calibration><image_width>640</image_width></calibration>", "is no table of keys in <opencv_storage>"),
+        ('<!DOCTYPE x [<!ENTITY y "z">]><opencv_storage>&y;</opencv_storage>', "has a document type"),
+        ("<a>" * 5000 + "</a>" * 5000, "not valid XML: maximum recursion depth"),
+        ("<opencv_storage>640</opencv_storage>", "is no table of keys in <opencv_storage>"),
+        ("<opencv_storage><k1>1</k1><k1>2</k1></opencv_storage>", 'key "k1" stands twice'),
+        ("<opencv_storage><K>1 <_>2</_></K></opencv_storage>", "text beside other elements in <K>"),
+        ("<opencv_storage><image_width>640</image_width></opencv_storage>", 'no 3 x 3 matrix "camera_matrix"'),
+    ],
+)
+def test_xml_that_opencv_did_not_write_is_refused(text: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "K1.xml").write_text(text)
+    with pytest.raises(BadInputError, match=says):
+        import_network([tmp_path / "K1.xml"])

@@ -1,4 +1,4 @@
-"""The folder of the pictures of one calibration: `FOLDER/pictures/K1/001.png`, the same number for one pulse."""
+"""The folder of one calibration: `pictures/K1/001.png` (one number for one pulse), and `set.json`: what they show."""
 
 import re
 from collections.abc import Mapping
@@ -7,17 +7,26 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+from pydantic import TypeAdapter, ValidationError
+
 from rig.api.calibrating import CalibratingOrder
 from rig.errors import StorageError
+from rig.host.disk import replace_file
+from rig.host.files import TEXT_MAX, read_whole
 from rig.settings.camera import Region
 
 #: In the folder of the recordings.
 CALIBRATIONS: Final = "calibrations"
 PICTURES: Final = "pictures"
 RESULT: Final = "calibration.json"
+_SET: Final = "set.json"
 #: More pictures tell nothing new, and take minutes to adjust.
 MOST: Final = 24
 _NAME: Final = re.compile(r"\d{3,}\.png")
+
+
+#: What `set.json` holds: what was printed, and the regions of the cameras.
+_PRINTED: Final = TypeAdapter(tuple[CalibratingOrder, dict[str, Region]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +57,7 @@ class PictureSet:
         }  # fmt: skip
 
 
-def new_folder(directory: Path) -> Path:
+def new_set(directory: Path, order: CalibratingOrder, regions: Mapping[str, Region]) -> PictureSet:
     """Make the folder of another calibration in the folder of the recordings.
 
     Raises:
@@ -61,9 +70,27 @@ def new_folder(directory: Path) -> Path:
         folder = folder.with_name(f"{name}-{number}")
     try:
         (folder / PICTURES).mkdir(parents=True)
+        replace_file(folder / _SET, _PRINTED.dump_json((order, dict(regions)), indent=2), links=False)
     except OSError as error:
         raise StorageError(f"{folder}: cannot be made ({error.strerror}); look at the disk") from error
-    return folder
+    return PictureSet(folder, order, regions)
+
+
+def last_set(directory: Path, in_use: Path | None) -> PictureSet | None:
+    """The pictures that were begun last, by this service or one before it; None: there are none that go on.
+
+    Args:
+        directory: folder of the recordings.
+        in_use: the calibration that the rig file names: no picture is added to those that it comes of.
+    """
+    last = max((directory / CALIBRATIONS).glob(f"*/{_SET}"), default=None)
+    if last is None or (in_use is not None and in_use.resolve().parent == last.resolve().parent):
+        return None
+    try:
+        order, regions = _PRINTED.validate_json(read_whole(last, TEXT_MAX, links=False))
+    except (OSError, ValidationError):  # nobody knows what these pictures are of: another set is begun
+        return None
+    return PictureSet(last.parent, order, regions)
 
 
 def picture_path(pictures: Path, camera: str, number: int) -> Path:

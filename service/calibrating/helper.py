@@ -18,7 +18,7 @@ from rig.errors import StateForbidsError, StorageError
 from rig.phrase import as_plain, phrase
 from rig.settings.camera import Region
 from rig.settings.model import RigSettings
-from service.calibrating.folder import MOST, RESULT, PictureSet, new_folder, numbers, remove_last
+from service.calibrating.folder import MOST, RESULT, PictureSet, last_set, new_set, numbers, remove_last
 from service.calibrating.said import lens, problem_in, seen
 
 #: Without anybody who looks at it, the helper ends after so long a time.
@@ -50,7 +50,7 @@ class CalibrationHelper:
         self._directory, self._rig, self._live, self._busy, self._keep = directory, rig, live, busy, keep
         self._lock, self._commands = threading.Lock(), threading.RLock()
         self._state, self._held = CalibratingState.OFF, False
-        self._set: PictureSet | None = None
+        self._set = last_set(directory, rig().calibration)
         self._news: dict[str, Any] = {}
         self._problem: Statement | None = None
         self._lenses: tuple[CalibratedLens, ...] = ()
@@ -94,7 +94,7 @@ class CalibrationHelper:
             self._end()
             with self._lock:
                 if known is None or order.anew or self._saved:
-                    known, self._news = PictureSet(new_folder(self._directory), printed, regions), {}
+                    known, self._news = new_set(self._directory, printed, regions), {}
                 self._set, self._problem, self._lenses, self._saved = known, None, (), False
             self._start(CalibratingState.LOOKING, self._find)
             return self.view()

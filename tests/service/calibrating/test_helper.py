@@ -72,6 +72,43 @@ def test_pictures_go_on_unless_it_is_begun_anew_or_with_another_target(tmp_path:
         assert helper.begin(CalibratingOrder(columns=11, anew=True)).folder not in {first, other.folder}
 
 
+def test_pictures_go_on_after_a_restart_of_the_service(tmp_path: Path, slot: PreviewSlot) -> None:
+    with closing(_helper(tmp_path, slot, [])) as helper:
+        folder = helper.begin(CalibratingOrder(square_mm=60)).folder
+    assert folder is not None
+    _keep(Path(folder), 1, "K1")
+    with closing(_helper(tmp_path, slot, [])) as again:
+        assert (again.view().folder, again.view().taken) == (folder, 1)
+        assert again.begin(CalibratingOrder(square_mm=60)).folder == folder
+        other = again.begin(CalibratingOrder()).folder
+        assert other not in {None, folder}
+    with closing(_helper(tmp_path, slot, [])) as third:
+        assert third.view().folder == other
+    assert numbers(Path(folder)) == [1]
+
+
+@pytest.mark.parametrize("result", ["calibration.json", "joined.json"])
+def test_pictures_whose_calibration_the_rig_file_names_do_not_go_on(
+    result: str, tmp_path: Path, slot: PreviewSlot
+) -> None:
+    with closing(_helper(tmp_path, slot, [])) as helper:
+        folder = helper.begin(CalibratingOrder()).folder
+    assert folder is not None
+    rig = SIM.model_copy(update={"calibration": Path(folder).parent / result})
+    with closing(CalibrationHelper(tmp_path, lambda: rig, slot.fd, lambda: False, lambda _: None)) as again:
+        assert again.view().folder is None
+        assert again.begin(CalibratingOrder()).folder != folder
+
+
+def test_a_description_that_cannot_be_read_begins_another_set(tmp_path: Path, slot: PreviewSlot) -> None:
+    with closing(_helper(tmp_path, slot, [])) as helper:
+        folder = helper.begin(CalibratingOrder()).folder
+    assert folder is not None
+    (Path(folder).parent / "set.json").write_text('[{"columns": 1}, {}]')
+    with closing(_helper(tmp_path, slot, [])) as again:
+        assert again.begin(CalibratingOrder()).folder != folder
+
+
 def test_what_is_in_the_rig_file_is_not_touched_and_other_regions_are_refused(
     tmp_path: Path, slot: PreviewSlot
 ) -> None:

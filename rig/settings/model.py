@@ -153,7 +153,11 @@ class AnalysisSettings(StrictModel):
         description="what is done with every log by itself after its end: measure, then video (MP4 with the stick "
         "figure), then copy (of log and result, to copy_to); [] for nothing",
     )
-    copy_to: Path | None = Field(None, description="folder that logs and results are copied to, e.g. on a second disk")
+    copy_to: Path | None = Field(
+        None,
+        description="folder that logs and results are copied to, e.g. on a second disk, relative to the working "
+        "directory",
+    )
 
     @model_validator(mode="after")
     def _steps_fit_together(self) -> "AnalysisSettings":

@@ -1,5 +1,7 @@
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -349,6 +351,49 @@ def test_a_scenario_is_relative_to_its_rig_file(tmp_path: Path) -> None:
     simulation = load_rig(path).simulation
     assert simulation is not None
     assert simulation.scenario == tmp_path / "hill.toml"
+
+
+#: Keys of the rig file that name a file or a folder, each with a rig file that has it, and how one gets at it.
+PATHS: dict[str, tuple[str, Callable[[Any], Path]]] = {
+    "calibration": ("calibration = '{}'\n", lambda rig: rig.calibration),
+    "plan": ("plan = '{}'\n", lambda rig: rig.plan),
+    "RecorderSettings.directory": ("[recorder]\ndirectory = '{}'\n", lambda rig: rig.recorder.directory),
+    "RecorderSettings.fallback_directory": (
+        "[recorder]\nfallback_directory = '{}'\n", lambda rig: rig.recorder.fallback_directory,
+    ),
+    "NetworkSettings.curve_key_file": ("[network]\ncurve_key_file = '{}'\n", lambda rig: rig.network.curve_key_file),
+    "AnalysisSettings.survey": ("[analysis]\nsurvey = '{}'\n", lambda rig: rig.analysis.survey),
+    "AnalysisSettings.calibration": ("[analysis]\ncalibration = '{}'\n", lambda rig: rig.analysis.calibration),
+    "AnalysisSettings.copy_to": (
+        "[analysis]\nsurvey = 's'\nafter_recording = ['measure', 'copy']\ncopy_to = '{}'\n",
+        lambda rig: rig.analysis.copy_to,
+    ),
+    "WebhookSettings.url_file": ("[service.webhook]\nurl_file = '{}'\n", lambda rig: rig.service.webhook.url_file),
+    "WebhookSettings.token_file": (
+        "[service.webhook]\nurl = 'https://club.example/x'\ntoken_file = '{}'\n",
+        lambda rig: rig.service.webhook.token_file,
+    ),
+    "SimulationSettings.scenario": ("[simulation]\nscenario = '{}'\n", lambda rig: rig.simulation.scenario),
+}  # fmt: skip
+
+
+def test_every_path_says_where_it_begins_and_begins_there(tmp_path: Path) -> None:
+    """The rule of `docs/rig-file.md`: what describes the rig is relative to its file, where recordings go is not."""
+    schema = json.loads(rig_schema())
+    tables = {"": schema, **{f"{name}.": table for name, table in schema["$defs"].items()}}
+    said = {
+        f"{table}{key}": value["description"]
+        for table, content in tables.items()
+        for key, value in content.get("properties", {}).items()
+        if '"format": "path"' in json.dumps(value)
+    }
+    assert set(said) == set(PATHS)
+    path = tmp_path / "rig.toml"
+    for key, (text, get) in PATHS.items():
+        path.write_text(HEAD + (text + CAMERA if "." not in key else CAMERA + text).format("some/where"))
+        to_the_rig = "relative to the rig file" in said[key]
+        assert to_the_rig is not ("relative to the working directory" in said[key]), key
+        assert get(load_rig(path)) == (tmp_path if to_the_rig else Path()) / "some" / "where", key
 
 
 def test_a_calibration_is_relative_to_its_rig_file(tmp_path: Path) -> None:

@@ -1,8 +1,8 @@
 """The jumper of the path-traced pictures: rigid smooth parts, and where they are in a pose.
 
 Markers are thin plates: helmet and hip lie on the surface of the body, towards the cameras, so that the body stands
-behind them; those of the skis stand upright on the ski line before the toes of the boots. The centre of each plate is
-the marker's place in the truth.
+behind them; those of the skis stand upright on the ski line before the toes of the boots, where the ski is no more than
+a rod. The centre of each plate is the marker's place in the truth.
 """
 
 import math
@@ -17,9 +17,9 @@ from simrig.world.scenario import Jumper
 
 MARKER_THICK_M: Final = 0.006
 _CLEAR_M: Final = 0.01  # between a marker's plate and the body behind it
-_HELMET_M, _PELVIS_M = 0.13, 0.15
+_HELMET_M, _PELVIS_M = 0.13, 0.155
 _HEAD_M: Final = 0.19  # from the middle of the helmet to the neck
-_HIP_ASIDE_M, _SHOULDER_ASIDE_M, _HAND_ASIDE_M = 0.06, 0.16, 0.21
+_HIP_ASIDE_M, _SHOULDER_ASIDE_M, _HAND_ASIDE_M = 0.055, 0.16, 0.21
 _TOE_M, _ANKLE_BACK_M, _ANKLE_UP_M = 0.02, 0.2, 0.11
 _THIGH_M: Final = 0.45
 #: Of the parts that are stretched from joint to joint, m.
@@ -34,7 +34,7 @@ _LENGTHS: Final = {
     "shaft": 0.2,
 }
 _SKI_WIDTHS: Final = ((-1.15, 0.045), (-0.7, 0.05), (0.0, 0.046), (0.8, 0.05), (1.15, 0.056), (1.3, 0.052))
-_SKI_THICK_M, _TIP_M, _TIP_UP_M = 0.018, 0.28, 0.09
+_SKI_THICK_M, _ROD_M, _TIP_M, _TIP_UP_M = 0.018, 0.004, 0.28, 0.09
 _PRINTS: Final = ((-0.8, -0.65), (-0.4, -0.3), (0.3, 0.45), (0.75, 0.9))  # shares of half the ski
 
 
@@ -55,21 +55,21 @@ class Figure:
             "neck": (limb(_LENGTHS["neck"], (0.06, 0.055)), ("skin",)),
             "helmet": (ellipsoid(_HELMET_M, _HELMET_M, _HELMET_M), ("helmet",)),
             "visor": (ellipsoid(0.1, 0.08, 0.07), ("visor",)),
-            "thigh": (limb(_LENGTHS["thigh"], (0.07, 0.085, 0.082, 0.074, 0.066)), ("suit",)),
+            "thigh": (limb(_LENGTHS["thigh"], (0.06, 0.078, 0.08, 0.074, 0.066)), ("suit",)),
             "shank": (limb(_LENGTHS["shank"], (0.064, 0.066, 0.06, 0.052, 0.05)), ("suit",)),
             "upper arm": (limb(_LENGTHS["upper arm"], (0.06, 0.058, 0.048)), ("suit",)),
             "forearm": (limb(_LENGTHS["forearm"], (0.046, 0.046, 0.036)), ("suit",)),
             "glove": (ellipsoid(0.05, 0.035, 0.09), ("glove",)),
             "boot": (limb(_LENGTHS["boot"], (0.055, 0.05, 0.048, 0.04), 0.85), ("boot",)),
             "shaft": (limb(_LENGTHS["shaft"], (0.055, 0.058, 0.06)), ("boot",)),
-            "ski": (_ski(jumper.ski_length_m, bend_m), ("ski", "print")),
+            "ski": (_ski(jumper.ski_length_m, bend_m, jumper.marker_radius_m), ("ski", "print")),
             "marker": (disc(jumper.marker_radius_m, MARKER_THICK_M), ("marker",)),
         }
 
     def joints(self, pose: Pose) -> Floats:
         """All points of the figure in the order of `simrig.world.figure.body.joints`, m, shape (19, 3)."""
         forward, side, up = pose.axes
-        pelvis = pose.markers[1] - (_PELVIS_M + _CLEAR_M) * self._towards
+        pelvis = pose.markers[1] - (_PELVIS_M + _CLEAR_M) * self._faces(pose)[1]
         helmet = pose.markers[0] - (_HELMET_M + _CLEAR_M) * self._towards
         trunk = (helmet - pelvis) / np.linalg.norm(helmet - pelvis)
         neck = helmet - _HEAD_M * trunk
@@ -126,9 +126,17 @@ class Figure:
                 f"{which} ski": (binding, binding + along, np.cross(along, above)),
             }
         upright = np.array((0.0, 0.0, 1.0))
-        ends |= {f"P{i + 1} marker": (X, X + self._towards, upright) for i, X in enumerate(pose.markers) if worn[i]}
+        plates = zip(pose.markers, self._faces(pose), worn, strict=True)
+        ends |= {f"P{i} marker": (X, X + face, upright) for i, (X, face, on) in enumerate(plates, 1) if on}
         meshes = {name: next(mesh for mesh in self.meshes if name.endswith(mesh)) for name in ends}
         return {name: (meshes[name], _between(*of, _LENGTHS.get(meshes[name]))) for name, of in ends.items()}
+
+    def _faces(self, pose: Pose) -> list[Floats]:
+        """Where the plates of P1..P4 face, unit: that of the hip is upright on the trunk, which else would hide it."""
+        trunk = pose.markers[0] - pose.markers[1]
+        trunk /= np.linalg.norm(trunk)
+        hip = self._towards - (self._towards @ trunk) * trunk
+        return [self._towards, np.asarray(hip / np.linalg.norm(hip)), self._towards, self._towards]
 
     @property
     def _toe_m(self) -> float:
@@ -136,18 +144,22 @@ class Figure:
         return self._jumper.marker_radius_m + _TOE_M
 
 
-def _ski(length_m: float, bend_m: float) -> Mesh:
-    """A ski along z, its top towards -y: tapered, bent, with a tip that is turned up, and prints."""
+def _ski(length_m: float, bend_m: float, rod_m: float) -> Mesh:
+    """A ski along z, its top towards -y: tapered, bent, with a turned up tip, prints, and a rod in its middle."""
     half = length_m / 2
     prints = [(a * half, b * half) for a, b in _PRINTS]
-    steps = np.unique(np.round([*np.linspace(-half, half, 41), *np.ravel(prints)], 4))
+    rod = [-rod_m, -rod_m + 0.002, rod_m - 0.002, rod_m]
+    steps = np.unique(np.round([*np.linspace(-half, half, 41), *np.ravel(prints), *rod], 4))
     rings, known = [], np.array(_SKI_WIDTHS)
     for s in steps:
         wide = float(np.interp(s * 2.6 / length_m, known[:, 0], known[:, 1]))
         tip = max(0.0, s - (half - _TIP_M)) / _TIP_M
         wide *= math.sqrt(max(0.05, 1 - tip**3))
         lift = bend_m * ((s / half) ** 2 - 1 / 3) + _TIP_UP_M * tip**2
-        low, high = -lift + _SKI_THICK_M / 2, -lift - _SKI_THICK_M / 2
+        thick = _SKI_THICK_M
+        if abs(s) < rod_m - 0.001:
+            wide, thick = _ROD_M, _ROD_M
+        low, high = -lift + thick / 2, -lift - thick / 2
         rings.append([(-wide, high, s), (wide, high, s), (wide, low, s), (-wide, low, s)])
     marked = [i for i, s in enumerate(steps[:-1]) if any(a - 1e-6 <= s < b - 1e-6 for a, b in prints)]
     return skin(np.array(rings), smooth=False, marked=marked)

@@ -61,18 +61,18 @@ class Scenery:
 
     def _table(self) -> dict[str, Placed]:
         """The take-off table with its two tracks."""
-        half, foot = self._scenario.hill.table_width_m / 2, float(self._scenario.hill.ground(0.0)) - 2
+        half, hill = self._scenario.hill.table_width_m / 2, self._scenario.hill
         beams = {
-            "table": (self._beam(-half, half, -0.02, foot), "boards"),
-            **{f"track {y}": (self._beam(y - 0.06, y + 0.06, -0.01, foot), "ice") for y in (-0.17, 0.17)},
+            "table": (self._beam(-half, half, -0.02, hill.table_height_m + 8), "boards"),
+            **{f"track {y}": (self._beam(y - 0.06, y + 0.06, -0.01, 0.015), "ice") for y in (-0.17, 0.17)},
         }
         return {name: (beam, (of,), [np.eye(4)]) for name, (beam, of) in beams.items()}
 
-    def _beam(self, right: float, left: float, above: float, foot: float) -> Mesh:
+    def _beam(self, right: float, left: float, above: float, thick: float) -> Mesh:
         """A beam along the table from its edge on, its top so much above the table's surface; m."""
         body = box((_TABLE_END_M, right, 0), (0, left, 1))
         corners = body.corners.copy()
-        corners[:, 2] = np.where(corners[:, 2] > 0, self._scenario.hill.table(corners[:, 0]) + above, foot)
+        corners[:, 2] = self._scenario.hill.table(corners[:, 0]) + np.where(corners[:, 2] > 0, above, above - thick)
         return Mesh(corners, body.faces, smooth=False)
 
     def _forest(self) -> Placed:

@@ -106,6 +106,17 @@ def box(low: Sequence[float], high: Sequence[float]) -> Mesh:
     return skin(np.array([[(a, b, c) for a, b in ring] for c in (z, Z)]), smooth=False)
 
 
+def arc(radius: float, half_height: float) -> Mesh:
+    """A half cylinder about the y axis, open towards -z; m."""
+    turn = np.linspace(-math.pi / 2, math.pi / 2, _AROUND)
+    low, high = (
+        np.stack((radius * np.sin(turn), np.full(_AROUND, y), radius * np.cos(turn)), axis=1)
+        for y in (-half_height, half_height)
+    )
+    faces: list[tuple[int, ...]] = [(k, k + 1, k + 1 + _AROUND, k + _AROUND) for k in range(_AROUND - 1)]
+    return Mesh(np.concatenate((low, high)), faces)
+
+
 def grid(x: Floats, y: Floats, z: Floats) -> Mesh:
     """A surface over a grid.
 

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from bench.corpus.path_traced.meshes import Mesh, box, disc, ellipsoid, grid, loft
+from bench.corpus.path_traced.meshes import Mesh, arc, box, disc, ellipsoid, grid, loft
 from rig.arrays import Floats
 from simrig.world.projection import Projection
 from simrig.world.scenario import Scenario
@@ -15,8 +15,8 @@ _BELOW_M: Final = 0.3  # of a line of sight; the snow must not be nearer
 _SLOPE: Final = 0.5  # of the snow beside a line of sight
 _TREES: Final = 500
 _FOREST_M: Final = (22.0, 70.0)  # beside the hill
-_PLATES: Final = 0.6  # share of the balls with a dark plate behind them
-_PLATE: Final = 2.2  # half width of a plate in radii of its ball
+_SHIELDED: Final = 0.85  # share of the balls with a dark shield behind them
+_SHIELD: Final = (2.4, 2.2)  # radius and half height of a shield in radii of its ball
 
 Placed = tuple[Mesh, tuple[str, ...], list[Floats]]  #: a mesh, its materials, and the matrices (4, 4) of its places
 
@@ -97,10 +97,10 @@ class Scenery:
         return spruce, ("needles",), places
 
     def _marks(self) -> dict[str, Placed]:
-        """The balls with their posts, plates, and the snow before them."""
+        """The balls with their posts, shields, and the snow before them."""
         radius = self._scenario.ball_radius_m
         where = np.array([ball.X for ball in self._balls])
-        plates, mounds, posts = [], [], []
+        shields, mounds, posts = [], [], []
         eye = np.mean([camera.X0 for camera in self._cameras], axis=0)
         for ball, place in zip(self._balls, where, strict=True):
             away = (place - eye) * (1, 1, 0)
@@ -109,19 +109,19 @@ class Scenery:
             post = np.diag((1.0, 1.0, place[2] - foot, 1.0))
             post[:3, 3] = place - (0, 0, place[2] - foot)
             posts.append(post)
-            if self._rng.random() < _PLATES:
-                plate = np.eye(4)
-                plate[:3] = np.stack((np.cross((0, 0, 1), away), (0, 0, 1), away, place + 1.3 * radius * away), axis=1)
-                plates.append(plate)
+            if self._rng.random() < _SHIELDED:
+                shield = np.eye(4)
+                shield[:3] = np.stack((np.cross((0, 0, 1), away), (0, 0, 1), away, place), axis=1)
+                shields.append(shield)
             if ball.covered:
                 mound = np.eye(4)
                 mound[:3, 3] = place + radius * (2 * ball.covered - 1) * np.array((0.0, 0.0, 1.0))
                 mounds.append(mound)
-        wide = _PLATE * radius
+        wide, high = (of * radius for of in _SHIELD)
         return {
             "ball": (ellipsoid(radius, radius, radius, rings=33), ("ball",), [_at(place) for place in where]),
             "post": (loft([(0, 0.03, 0.03), (1, 0.03, 0.03)]), ("post",), posts),
-            "plate": (box((-wide, -wide, 0), (wide, wide, 0.01)), ("plate",), plates),
+            "shield": (arc(wide, high), ("shield",), shields),
             "mound": (_under(disc(1.6 * radius, 4 * radius), 2 * radius), ("snow",), mounds),
         }
 

@@ -21,7 +21,7 @@ from simrig.world.scenario import BRIGHTEST, Scenario
 #: Radiance of a white surface in full light, of what a picture can hold: what is brighter still is told apart.
 WHITE: Final = 0.4
 STILL: Final = "still"  # picture of a camera without the jumper
-_SAMPLES, _STILL_SAMPLES, _BOUNCES = 8, 10, 1
+_SAMPLES, _STILL_SAMPLES, _BOUNCES = 8, 6, 1
 _AROUND_M: Final = 0.35  # rendered about the joints
 _ALBEDO: Final = 0.85  # of white
 _OVERCAST: Final = 0.9  # radiance of the sky without a sun

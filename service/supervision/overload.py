@@ -11,7 +11,7 @@ from typing import Final
 
 from rig.clocks import NS_PER_S
 from rig.health import Health
-from triggering.pairing.camera_track import HELD_BACK_NS
+from triggering.pairing.camera.activity import HELD_BACK_NS
 
 #: Trouble of several cameras within this time is of one cause, and is stated for so long.
 _TOGETHER_S: Final = 5.0

@@ -1,4 +1,4 @@
-"""What the health record says of each camera's pairing, and of the source of the pulses."""
+"""The parts of the health record about each camera's pairing, and about the source of the pulses."""
 
 from typing import Final
 
@@ -6,10 +6,10 @@ import msgspec
 
 from rig.clocks import NS_PER_S, DecimalNs, HostNs
 from rig.health import CameraPairing, SourcePairing
-from triggering.pairing.camera_track import CameraTrack
+from triggering.pairing.camera.track import CameraTrack
 from triggering.timeline.fired import FiredPulses
 
-#: What happened is told for so long.
+#: An incident stays in the health record for so long.
 _RECENT_NS: Final = 10 * NS_PER_S
 
 
@@ -25,7 +25,7 @@ def camera_health(track: CameraTrack, last: HostNs | None) -> CameraPairing:
         track: the camera.
         last: time of the last decided pulse.
     """
-    clock = track.clock
+    times, clock = track.times, track.times.clock
     return CameraPairing(
         connected=track.connected,
         silent=track.silent,
@@ -34,19 +34,19 @@ def camera_health(track: CameraTrack, last: HostNs | None) -> CameraPairing:
         clock_drift_ppm=round(clock.drift_ppm, 3),
         clock_uncertainty_us=round(clock.uncertainty_ns / 1000, 3) if clock.known else None,
         latency_ms=round(track.latency_ns / 1e6, 3),
-        clock_set=track.set_at is not None and is_recent(track.set_at, last),
+        clock_set=times.set_at is not None and is_recent(times.set_at, last),
         clock_from_zero=clock.from_zero,
-        doubted=track.belief.doubted,
-        exposure_subtracted_us=track.stamping.late_ns / 1000,
+        doubted=times.plausibility.doubted,
+        exposure_subtracted_us=times.stamping.late_ns / 1000,
         **msgspec.structs.asdict(track.counters),
     )
 
 
 def source_health(fired: FiredPulses, last: HostNs | None) -> SourcePairing | None:
-    """The part of the health record about the source of the pulses; None: it does not tell of them.
+    """The part of the health record about the source of the pulses; None: it does not report its pulses.
 
     Args:
-        fired: what it told.
+        fired: the pulses that it reported.
         last: time of the last decided pulse.
     """
     if not fired.active:

@@ -1,4 +1,4 @@
-"""Keeps the frames whose trigger time cannot be believed yet, in each camera's order, until something decides.
+"""Keeps the frames whose trigger times cannot be judged yet, in each camera's order.
 
 Their pixels stay in the cameras' rings meanwhile. Damaged arrivals behind them wait too, so that the order stays.
 """
@@ -11,8 +11,8 @@ from rig.clocks import NS_PER_S, HostNs
 from rig.frame import Record, RecordKind
 from triggering.pairing.outcomes import OpenPulse
 
-#: The clock is read right after a frame that comes out of turn, and four times a second; a camera that does not answer
-#: for this long has no clock to be believed.
+#: The clock is read right after a frame that comes out of turn, and four times a second. If the camera does not answer
+#: for this long, its clock is not known.
 _LONGEST_NS: Final = NS_PER_S
 
 

@@ -1,8 +1,9 @@
 """A trigger pulse: open while its frames come in, then closed, with what became of it in every camera."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
+
+import msgspec
 
 from rig.clocks import HostNs
 from rig.frame import FrameStatus, Record
@@ -65,8 +66,7 @@ class OpenPulse:
         return max(times) - min(times) if times else 0
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(msgspec.Struct, frozen=True):
     """What became of a pulse in one camera.
 
     Attributes:
@@ -85,8 +85,7 @@ NO_FRAME: Final[Mapping[FrameStatus, Outcome]] = {status: Outcome(status) for st
 OVERRUN: Final = Outcome(FrameStatus.MISSED, overrun=True)
 
 
-@dataclass(frozen=True, slots=True)
-class ClosedPulse:
+class ClosedPulse(msgspec.Struct, frozen=True):
     """A decided pulse.
 
     Attributes:

@@ -4,7 +4,9 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from rig.clocks import HostNs
-from triggering.pairing.camera_track import FIRST_NS, HELD_BACK_NS, CameraTrack
+from triggering.pairing.camera.activity import HELD_BACK_NS
+from triggering.pairing.camera.presence import FIRST_NS
+from triggering.pairing.camera.track import CameraTrack
 from triggering.pairing.held import HeldFrames
 from triggering.pairing.outcomes import OpenPulse
 from triggering.timeline.pulse_train import PulseTrain
@@ -13,18 +15,12 @@ from triggering.timeline.pulse_train import PulseTrain
 SILENT_PERIODS: Final = 3
 
 
-def fall_silent(track: CameraTrack) -> None:
-    """Note that a camera is silent."""
-    track.silent = True
-    track.counters.silences += 1
-
-
 class Silence:
     """Judges the cameras by the pulses that lack their frames.
 
     Args:
         tracks: the cameras.
-        held: the frames that wait to be believed; a camera that has one is not silent.
+        held: the frames that wait; a camera that has one is not silent.
         train: the rhythm of the pulses.
     """
 
@@ -44,7 +40,8 @@ class Silence:
         if len(waiting) < SILENT_PERIODS:
             return
         for camera, track in enumerate(self._tracks):
-            since = track.alive if track.delivers else track.alive + FIRST_NS
+            alive = track.activity.alive
+            since = alive if track.delivers else alive + FIRST_NS
             since = max(since, HostNs(now - hold_ns))
             behind = [pulse.time for pulse in waiting if pulse.frames[camera] is None and pulse.time > since]
             late = len(behind) >= SILENT_PERIODS and now > behind[0] + track.latency_ns + HELD_BACK_NS
@@ -52,19 +49,19 @@ class Silence:
                 yield camera
 
     def decide(self, pulse: OpenPulse, waiting: Sequence[OpenPulse], now: HostNs) -> None:
-        """At the deadline of a pulse, find which of the cameras that it lacks are silent."""
+        """At the deadline of a pulse, find which of the cameras without a frame of it are silent."""
         for camera, track in enumerate(self._tracks):
             if pulse.frames[camera] is not None or self._held.first(camera) is not None:
                 continue
-            if not track.may_deliver(pulse.time) or track.alive > pulse.time:
+            if not track.may_deliver(pulse.time) or track.activity.alive > pulse.time:
                 continue
-            if track.is_slow(now) or track.heard > pulse.time + track.latency_ns + HELD_BACK_NS:
+            if track.is_slow(now) or track.activity.heard > pulse.time + track.latency_ns + HELD_BACK_NS:
                 continue  # its frames are still coming
-            periods, before = track.unanswered, pulse.time
+            periods, before = track.activity.unanswered, pulse.time
             for other in waiting:
                 # Frames of younger pulses may be on their way. Pulses that no camera delivered count too.
                 if other.time - pulse.time < (SILENT_PERIODS - 0.5) * self._train.period_ns:
                     periods += 1 + self._train.room(other.time - before)
                     before = other.time
             if periods >= SILENT_PERIODS:
-                fall_silent(track)
+                track.fall_silent()

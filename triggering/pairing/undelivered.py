@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from rig.clocks import HostNs
-from triggering.pairing.camera_track import CameraTrack
-from triggering.pairing.gaps import Gap
+from triggering.pairing.camera.gaps import Gap
+from triggering.pairing.camera.track import CameraTrack
 from triggering.pairing.outcomes import OpenPulse
 from triggering.timeline.pulse_train import PulseTrain
 
@@ -19,7 +19,7 @@ from triggering.timeline.pulse_train import PulseTrain
 _GAP_PERIODS: Final = 1.5
 #: The ids of one camera alone prove this many pulses; more must be confirmed by a second camera if there is one whose
 #: ids could tell, so that a wrong id does not fill a pause with pulses.
-_BELIEVED_ALONE: Final = 3
+_PROVEN_ALONE: Final = 3
 #: In a gap of at most this many pulses that is a whole number of periods long (to this share of one), the train ran on.
 _SHORT_ROOM: Final = 4
 _WHOLE: Final = 0.25
@@ -36,11 +36,7 @@ def undelivered_times(waiting: Sequence[OpenPulse], tracks: Sequence[CameraTrack
     if train.last is None or waiting[0].time - train.last <= _GAP_PERIODS * train.period_ns:
         return []
     start, span = train.last, waiting[0].time - train.last
-    witnesses = [
-        (camera, gap)
-        for camera, track in enumerate(tracks)
-        if (gap := _gap_across(track, start, train.tolerance_ns)) is not None
-    ]
+    witnesses = [(camera, gap) for camera, track in enumerate(tracks) if (gap := track.gap_across(start)) is not None]
     if not any(gap.holes for _, gap in witnesses):
         return []
     room = max(1, train.room(span))
@@ -48,15 +44,9 @@ def undelivered_times(waiting: Sequence[OpenPulse], tracks: Sequence[CameraTrack
         return _spaced(start, span, room, train.period_ns)
     proven = sorted(gap.taken - _room_later(waiting, camera, gap, train) for camera, gap in witnesses)
     count = proven[-1]
-    if count > _BELIEVED_ALONE and len(proven) > 1:
+    if count > _PROVEN_ALONE and len(proven) > 1:
         count = proven[-2]
     return _spaced(start, span, min(count, room), train.period_ns)
-
-
-def _gap_across(track: CameraTrack, time: HostNs, tolerance_ns: float) -> Gap | None:
-    """The gap of a camera that reaches beyond `time`, if ids and times can prove anything in it."""
-    gap = track.gap_after(time)
-    return gap if gap is not None and gap.anchored and gap.start <= time + tolerance_ns else None
 
 
 def _room_later(waiting: Sequence[OpenPulse], camera: int, gap: Gap, train: PulseTrain) -> int:

@@ -4,6 +4,7 @@ Nothing of it is believed from the rig file: its rate only serves until enough p
 """
 
 from collections import deque
+from math import ceil
 from statistics import median_low
 from typing import Final
 
@@ -82,13 +83,19 @@ class PulseTrain:
         if len(self._intervals) < RHYTHM_LEAST:
             return None
         usual = median_low(self._intervals)
-        agreeing = [interval for interval in self._intervals if abs(interval - usual) < AGREE * usual]
+        reach = ceil(AGREE * usual) - 1  # intervals are whole ns: they agree if they differ by less than the share
+        least, most = usual - reach, usual + reach
+        agreeing = [interval for interval in self._intervals if least <= interval <= most]
         return sum(agreeing) / len(agreeing) if 2 * len(agreeing) >= len(self._intervals) else None
 
     @property
     def shortest_ns(self) -> float:
         """The shortest time between two of the recent pulses; the period if there are none."""
         return min(self._intervals, default=self.period_ns)
+
+    def is_decided(self, time: HostNs) -> bool:
+        """Whether a trigger time is of the last decided pulse, or of an earlier one."""
+        return self.last is not None and time <= self.last + self.tolerance_ns
 
     def go_on(self, time: HostNs) -> None:
         """Enter a pulse that no camera could see; its time follows from the rhythm, so it tells nothing of it."""

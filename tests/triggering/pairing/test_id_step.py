@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from triggering.pairing.frame_ids import id_step
+from triggering.pairing.camera.frame_ids import id_step
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from tests.support.reliability import FaultTable
 from tests.triggering.tags import recount, tags_of
 from triggering.ledger.recounted import Recounted
 from triggering.pairing.alarms import alarms
-from triggering.pairing.belief import Belief, Verdict
+from triggering.pairing.camera.plausibility import Plausibility, Verdict
 from triggering.pairing.outcomes import ClosedPulse
 
 PULSES = 1500
@@ -104,7 +104,7 @@ def test_no_triplet_mixes_pulses_and_every_possible_one_is_found(case: Case, fau
 
 def test_the_bench_sees_mixed_triplets(monkeypatch: pytest.MonkeyPatch) -> None:
     """A pairing that believes every clock mixes them."""
-    monkeypatch.setattr(Belief, "judge", lambda *_, **__: Verdict.BELIEVED)
+    monkeypatch.setattr(Plausibility, "judge", lambda *_, **__: Verdict.ACCEPTED)
     case = next(case for case in CASES if case.name == "clocks step by one period")
     hill = WatchedHill(case)
     assert hill.run().mixed > 0

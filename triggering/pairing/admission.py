@@ -1,0 +1,103 @@
+"""Accepts the frames of all cameras, refuses them, or lets them wait until their trigger times can be judged."""
+
+from collections.abc import Iterator, Sequence
+
+from rig.clocks import HostNs
+from rig.frame import Record, RecordKind
+from triggering.pairing.camera.plausibility import Verdict
+from triggering.pairing.camera.track import CameraTrack
+from triggering.pairing.held import HeldFrames
+from triggering.pairing.known_pulses import KnownPulses
+from triggering.pairing.other_cameras import OtherCameras
+from triggering.timeline.pulse_train import PulseTrain
+
+
+class Admission:
+    """Judges the frames of each camera, in their order.
+
+    The methods that end a wait are generators: they yield each accepted frame, and go on when its pulse was noted by
+    `HeldFrames.release`, since the next frame is judged by it.
+
+    Args:
+        tracks: the cameras.
+        pulses: open and decided pulses.
+        held: the frames that wait.
+        train: the rhythm of the pulses.
+    """
+
+    def __init__(self, tracks: Sequence[CameraTrack], pulses: KnownPulses, held: HeldFrames, train: PulseTrain) -> None:
+        self._tracks, self._held = tracks, held
+        self._others = [OtherCameras(camera, tracks, pulses, held, train) for camera in range(len(tracks))]
+
+    def admits(self, camera: int, record: Record, time: HostNs) -> bool:
+        """Whether a frame that has just come, triggered at `time`, is accepted at once."""
+        track = self._tracks[camera]
+        if len(self._tracks) == 1 or not track.times.plausibility.warm:
+            return True
+        if self._held.first(camera) is not None:
+            return False
+        return track.judge_new(record, time, self._others[camera]) is Verdict.ACCEPTED
+
+    def settle(self, now: HostNs) -> Iterator[tuple[int, Record]]:
+        """Accept or refuse the frames that wait, as far as can be told at host time `now`: cameras and frames."""
+        for camera in range(len(self._tracks)):
+            for record in self._settle(camera):
+                yield camera, record
+        while ended := self._held.ended(now):
+            for camera in ended:
+                for record in self._settle_first(camera):
+                    yield camera, record
+
+    def end_epoch(self, camera: int) -> Iterator[Record]:
+        """Accept or refuse all frames of a camera that wait: no more evidence will come."""
+        self._note_damage_behind(camera)
+        while self._held.first(camera) is not None:
+            yield from self._settle_first(camera)
+
+    def refuse_all(self, camera: int) -> None:
+        """Refuse all frames of a camera that wait: its clock was set."""
+        self._note_damage_behind(camera)
+        while self._held.first(camera) is not None:
+            self._refuse_first(camera)
+
+    def _settle(self, camera: int) -> Iterator[Record]:
+        """Accept or refuse the frames of a camera that wait, as far as the evidence goes."""
+        track, others = self._tracks[camera], self._others[camera]
+        while waiting := self._held.frames(camera):
+            verdict = track.judge(waiting, others)
+            if verdict is Verdict.REJECTED and track.times.forget_old_readings():
+                verdict = track.judge(waiting, others)
+            if verdict is Verdict.WAITS:
+                return
+            if verdict is Verdict.ACCEPTED:
+                yield self._held.take(camera)
+                self._note_damage_behind(camera)
+            else:
+                self._refuse_first(camera, rejected=True)
+
+    def _settle_first(self, camera: int) -> Iterator[Record]:
+        """Accept or refuse the first frame of a camera that waits, which has waited for as long as it may."""
+        waiting = self._held.frames(camera)
+        if waiting:
+            if self._tracks[camera].judge(waiting, self._others[camera], final=True) is Verdict.ACCEPTED:
+                yield self._held.take(camera)
+                self._note_damage_behind(camera)
+            else:
+                self._refuse_first(camera)
+        yield from self._settle(camera)
+
+    def _refuse_first(self, camera: int, *, rejected: bool = False) -> None:
+        """Refuse the first frame of a camera that waits."""
+        track, record = self._tracks[camera], self._held.take(camera)
+        if rejected:
+            track.reject(record)
+        else:
+            track.refuse(record)
+        self._held.release(camera, record, None)
+        self._note_damage_behind(camera)
+
+    def _note_damage_behind(self, camera: int) -> None:
+        """Enter the damaged arrivals behind a frame that no longer waits."""
+        track = self._tracks[camera]
+        while (behind := self._held.first(camera)) is not None and behind.kind is RecordKind.DAMAGED:
+            track.note_damage(self._held.take(camera))

@@ -50,8 +50,8 @@ from rig.transport.recorder_reports import (
     RecorderWarm,
 )
 from rig.transport.ring import CameraRing
+from triggering.alarms.notices import SpreadTeller
 from triggering.sources.choice import trigger_source
-from triggering.sources.telling import SpreadTeller
 from triggering.timeline.steady_rate import steady_rate
 
 _REPORT_EVERY_NS: Final = NS_PER_S // 5

@@ -31,8 +31,8 @@ from service.status.statements import about_camera, about_state, camera_state, p
 from service.supervision.state_machine import Phase
 from service.supervision.tap_guard import tap_guard
 from service.supervision.watching import PulseRate
+from triggering.alarms.notices import set_up_only
 from triggering.sources.choice import trigger_source
-from triggering.sources.telling import set_up_only
 
 #: What the status of a camera takes from its health record.
 _MEASURED: Final = (

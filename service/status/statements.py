@@ -368,7 +368,7 @@ def pairing_alarm(said: Phrase, level: Level = Level.WARNING) -> Statement:
     """Something is wrong with clocks, trigger or rate.
 
     Args:
-        said: what is wrong, as `triggering.alarms` and `triggering.sources.telling` say it; what to do stands behind
+        said: what is wrong, as `triggering.alarms` says it; what to do stands behind
             its colon.
         level: how bad it is.
     """

@@ -1,20 +1,26 @@
-"""An alarm of a running rig: what is wrong, how bad it is, and whom events name as what it is about."""
+"""An alarm of a running rig: its cause, its level, and the part that its events are about."""
 
 from dataclasses import dataclass
+from typing import Final
 
 from rig.events import Level
 from rig.phrase import Phrase, phrase
 
+#: Topics on which several tests judge.
+STOPPED: Final = "stopped"
+RATE: Final = "rate"
+SPREAD: Final = "spread"
+
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """One thing that is wrong.
+    """One fault.
 
     Attributes:
-        topic: what may be wrong; of each topic there is one alarm at a time.
+        topic: the subject; there is one alarm of each topic at a time.
         level: `WARNING`, or `ERROR` where recordings suffer.
-        name: which part its events are about.
-        said: what is wrong; what to do stands behind its colon.
+        name: the part that its events are about.
+        said: the fault; the remedy stands behind its colon.
     """
 
     topic: str
@@ -24,6 +30,6 @@ class Alarm:
 
     @property
     def over(self) -> Phrase:
-        """That it is over."""
+        """The message that the fault is over."""
         what = Phrase(self.said.code, self.said.text.partition(": ")[0], self.said.values)
         return phrase("alarm_over", "over: {what}", what=what)

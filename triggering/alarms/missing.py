@@ -3,8 +3,8 @@
 Page's test (Biometrika 41, 1954): every frame that came or failed adds the logarithm of how much likelier it is in a
 camera that fails than in one that does not, and the sum never falls below zero. If it exceeds `ln T`, the camera fails;
 a good camera exceeds it once in `T` pulses at most (Lorden, Ann. Math. Stat. 42, 1971). The alarm ends by the same test
-the other way round. So a camera that loses every second frame is told of after 16 pulses, one that loses 2 % after
-some hundred, and no number of clean pulses gives an alarm.
+the other way round. So a camera that loses every second frame causes an alarm after 16 pulses, one that loses 2 %
+after some hundred, and no number of clean pulses does.
 """
 
 from collections import deque
@@ -14,11 +14,12 @@ from enum import Enum
 from math import log
 from typing import Final
 
-from rig.events import COMPUTER, TRIGGER
+from rig.events import COMPUTER, TRIGGER, Level
 from rig.health import Health
 from rig.phrase import Phrase, phrase
+from triggering.alarms.alarm import Alarm
 
-#: Of a good camera one frame in a thousand may fail; one of which every fiftieth fails is to be told of.
+#: Share of frames that fail in a good camera, and in one that is to cause an alarm.
 _GOOD: Final = 0.001
 _BAD: Final = 0.02
 #: A false alarm of some camera in a thousand half hours of 8 cameras at 200 Hz, at most.
@@ -89,7 +90,7 @@ class Missing:
         self._names, self._exposures_us = names, exposures_us
         self._cameras = [_Camera() for _ in names]
 
-    def look(self, health: Health, overloaded: Sequence[int]) -> list[tuple[str, str, Phrase]]:
+    def look(self, health: Health, overloaded: Sequence[int]) -> list[Alarm]:
         """Enter a record.
 
         Args:
@@ -97,8 +98,7 @@ class Missing:
             overloaded: indices of the cameras that suffer from a computer that is too slow.
 
         Returns:
-            For each cause of missed pulses: a name of it that stays, whom it is about, and what is wrong, with figures
-            of the last records.
+            An alarm for each cause of missed pulses, with figures of the last records; its topic stays the same.
         """
         for camera in range(len(self._cameras)):
             self._enter(camera, health)
@@ -106,7 +106,7 @@ class Missing:
             if test.cause is None and test.against > _LIMIT:
                 test.cause, test.for_it = self._cause(camera, health, overloaded), 0.0
             elif test.cause is not None and self._starved(camera, overloaded):
-                test.cause = Cause.COMPUTER  # no cable is accused any more
+                test.cause = Cause.COMPUTER  # not the cable
         causes = {test.cause for test in self._cameras}
         found: dict[str, list[int]] = {}
         for camera, test in enumerate(self._cameras):
@@ -115,7 +115,7 @@ class Missing:
                 test.cause = shared if shared in causes and shared is not None else test.cause
                 topic = test.cause.value if test.cause in _SHARED else f"camera {self._names[camera]}"
                 found.setdefault(topic, []).append(camera)
-        return [(topic, self._about(cameras), self._say(cameras)) for topic, cameras in found.items()]
+        return [Alarm(topic, Level.ERROR, self._about(cameras), self._say(cameras)) for topic, cameras in found.items()]
 
     def _about(self, cameras: list[int]) -> str:
         """Which part the events of an alarm are about."""
@@ -126,7 +126,7 @@ class Missing:
     def _enter(self, camera: int, health: Health) -> None:
         test, paired, fetched = self._cameras[camera], health.pairing.cameras[camera], health.cameras[camera]
         if not paired.connected or paired.silent or not paired.clock_known:
-            test.counts = None  # it is told of as a camera that is silent or away
+            test.counts = None  # a silent or disconnected camera has an alarm of its own
             return
         counts = {name: getattr(paired, name) for name in _PAIRED} | {name: getattr(fetched, name) for name in _FETCHED}
         before, test.counts = test.counts, counts
@@ -166,7 +166,7 @@ class Missing:
         return Cause.SLOW_LINK if test.counted("late") > (missed + lost) / 2 else Cause.LINK
 
     def _say(self, cameras: list[int]) -> Phrase:
-        """What is wrong with cameras of one cause."""
+        """The fault of cameras of one cause, in words."""
         tests = [self._cameras[camera] for camera in cameras]
         names = ", ".join(self._names[camera] for camera in cameras)
         failed = sum(test.counted("missed", "lost", "damaged") for test in tests)

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from statistics import median
 from typing import Final
 
+from rig.events import TRIGGER, Level
 from rig.health import Health, PairingHealth
-from rig.phrase import Phrase, phrase
+from rig.phrase import phrase
+from triggering.alarms.alarm import RATE, SPREAD, STOPPED, Alarm
 
 #: Pulses that came in a rhythm may stop only after so many: a hand does not keep one for so long.
 _RHYTHM_PULSES: Final = 64
@@ -46,9 +48,9 @@ class Stopped:
         self._seen = self._in_rhythm = self._again = self._empty = 0
         self._rate_hz: float | None = None
         self._since = 0.0
-        self._said: Phrase | None = None
+        self._present: Alarm | None = None
 
-    def look(self, pairing: PairingHealth, now: float) -> Phrase | None:
+    def look(self, pairing: PairingHealth, now: float) -> Alarm | None:
         """Enter a record.
 
         Args:
@@ -56,7 +58,7 @@ class Stopped:
             now: its time, s.
 
         Returns:
-            That they have stopped, until they are back; None: they have not.
+            The alarm that they have stopped, until they are back; None: they have not.
         """
         new, self._seen = pairing.seen - self._seen, pairing.seen
         if new > 0:
@@ -65,25 +67,26 @@ class Stopped:
             self._in_rhythm = 0 if pairing.rate_hz is None else self._in_rhythm + new
             self._again += new
             if self._again >= _OVERDUE:
-                self._said = None
-            return self._said
+                self._present = None
+            return self._present
         self._empty += 1
         watched = any(camera.connected for camera in pairing.cameras)
-        if self._said is None and watched and self._rate_hz is not None and self._in_rhythm >= _RHYTHM_PULSES:
+        if self._present is None and watched and self._rate_hz is not None and self._in_rhythm >= _RHYTHM_PULSES:
             overdue = (now - self._since) * self._rate_hz
             if overdue >= _OVERDUE and self._empty >= _EMPTY_RECORDS:
-                self._said, self._again = self._stopped(self._rate_hz), 0
-        return self._said
+                self._present, self._again = self._stopped(self._rate_hz), 0
+        return self._present
 
-    def _stopped(self, rate_hz: float) -> Phrase:
-        if self._commanded:
-            text = "no camera answers the commands to expose any more ({rate_hz} a second): disarm, and arm again"
-            return phrase("alarm_stopped_commands", text, rate_hz=round(rate_hz, 1))
+    def _stopped(self, rate_hz: float) -> Alarm:
         text = (
             "the pulses have stopped (there were {rate_hz} a second): see whether what makes them runs, then check "
             "the cable from it to the cameras"
         )
-        return phrase("alarm_stopped", text, rate_hz=round(rate_hz, 1))
+        said = phrase("alarm_stopped", text, rate_hz=round(rate_hz, 1))
+        if self._commanded:
+            text = "no camera answers the commands to expose any more ({rate_hz} a second): disarm, and arm again"
+            said = phrase("alarm_stopped_commands", text, rate_hz=round(rate_hz, 1))
+        return Alarm(STOPPED, Level.ERROR, TRIGGER, said)
 
 
 class Drift:
@@ -95,27 +98,28 @@ class Drift:
         self._rates: list[float] = []
         self._usual_hz: float | None = None
         self._limit = _DRIFT
-        self._said: Phrase | None = None
+        self._present: Alarm | None = None
 
-    def look(self, pairing: PairingHealth) -> Phrase | None:
-        """Enter a record; gives that the rate has drifted, until it is back."""
+    def look(self, pairing: PairingHealth) -> Alarm | None:
+        """Enter a record; gives the alarm that the rate has drifted, until it is back."""
         new, self._seen = pairing.seen - self._seen, pairing.seen
         rate = pairing.rate_hz
         if rate is None or new <= 0:
-            return self._said
+            return self._present
         if self._usual_hz is None:
             self._learn(rate, new)
             return None
         off = abs(rate / self._usual_hz - 1)
-        if off > self._limit and self._said is None:
+        if off > self._limit and self._present is None:
             text = (
                 "the pulses' rate has changed from {before_hz} to {rate_hz} Hz: check what makes them; if it is meant "
                 "so, disarm and arm"
             )
-            self._said = phrase("alarm_drift", text, before_hz=round(self._usual_hz, 2), rate_hz=round(rate, 2))
+            said = phrase("alarm_drift", text, before_hz=round(self._usual_hz, 2), rate_hz=round(rate, 2))
+            self._present = Alarm(RATE, Level.WARNING, TRIGGER, said)
         elif off < _BACK * self._limit:
-            self._said = None
-        return self._said
+            self._present = None
+        return self._present
 
     def _learn(self, rate: float, new: int) -> None:
         self._rates.append(rate)
@@ -128,8 +132,8 @@ class Drift:
         self._rates.clear()
 
 
-def spread(health: Health, names: Sequence[str]) -> Phrase | None:
-    """That the cameras' times within a pulse lie farther apart than one edge and the clocks' errors explain.
+def spread(health: Health, names: Sequence[str]) -> Alarm | None:
+    """The alarm that the cameras' times within a pulse lie farther apart than edge and clocks explain.
 
     Args:
         health: the record.
@@ -151,4 +155,5 @@ def spread(health: Health, names: Sequence[str]) -> Phrase | None:
         "trigger delay, its trigger edge and its cable"
     )
     spread_ms = round(pairing.spread_usual_us / 1000, 2)
-    return phrase("alarm_spread", text, spread_ms=spread_ms, share=share, camera=camera)
+    said = phrase("alarm_spread", text, spread_ms=spread_ms, share=share, camera=camera)
+    return Alarm(SPREAD, Level.WARNING, TRIGGER, said)

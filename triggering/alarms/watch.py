@@ -1,37 +1,29 @@
 """The alarms of a running rig, from the health records: each begins once, and ends once.
 
-What pulses and clocks say at one moment (`triggering.pairing.alarms`) becomes an alarm that lasts until pulses have
-come for a while without it. Stopped pulses, a drift and cameras that miss pulses have tests with a memory of their own.
+A fault that a single record shows (`momentary`) lasts until pulses have come for a while without it. Stopped pulses, a
+drift and cameras that miss pulses have tests with a memory of their own.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from rig.events import PAIRING, TRIGGER, Level
+from rig.events import Level
 from rig.health import Health
 from rig.settings.model import RigSettings
-from triggering.alarms.alarm import Alarm
+from triggering.alarms.alarm import RATE, SPREAD, STOPPED, Alarm
 from triggering.alarms.missing import Cause, Missing
+from triggering.alarms.momentary import momentary
 from triggering.alarms.train import Drift, Stopped, spread
-from triggering.pairing.alarms import alarms
 from triggering.sources.choice import trigger_source
 
-#: What has been seen at one moment is over when so many pulses have come without it.
+#: A fault that a single record showed is over when so many pulses have come without it.
 _CALM_PULSES: Final = 128
-_STOPPED: Final = "stopped"
-_RATE, _SPREAD = "rate", "spread"
-#: What an overloaded computer gives as well: one cause is one alarm.
-_FOLLOWING: Final = frozenset({_RATE, _SPREAD})
-#: With a larger spread frames may be paired wrongly (`triggering.timeline.pulse_train`).
-_WRONG: Final = "pairing_spread"
-#: What an alarm is about, by the code of what is said; other codes are topics of their own.
-_TOPICS: Final = {"pairing_rate": _RATE, "alarm_drift": _RATE, _WRONG: _SPREAD, "alarm_spread": _SPREAD}
 
 
 def _is_doubtful(alarm: Alarm) -> bool:
-    """Whether a computer that is too slow gives such a warning too; that frames may be paired wrongly counts anyhow."""
-    return alarm.topic in _FOLLOWING and alarm.level is not Level.ERROR
+    """Whether a slow computer causes such a warning too: one cause is one alarm. An error stays: frames may mix."""
+    return alarm.topic in {RATE, SPREAD} and alarm.level is not Level.ERROR
 
 
 @dataclass(slots=True)
@@ -59,7 +51,7 @@ class AlarmWatch:
         self._drift = Drift()
         self._missing = Missing(self._names, [camera.exposure_us for camera in rig.cameras])
         self._present: dict[str, _Present] = {}
-        self._remembered = {_STOPPED}  # topics of tests with a memory of their own: what they say no more is over
+        self._remembered = {STOPPED}  # topics of tests with a memory: without a new alarm the fault is over
 
     @property
     def present(self) -> list[Alarm]:
@@ -67,7 +59,7 @@ class AlarmWatch:
         return [found.alarm for found in self._present.values()]
 
     def expect_pauses(self) -> None:
-        """Note that pulses may have stopped on purpose since the last record: what was their rhythm is over."""
+        """Note that pulses may have stopped on purpose since the last record: their rhythm is forgotten."""
         self._stopped = self._stopped and Stopped(commanded=self._commanded)
 
     def look(self, health: Health, overloaded: Sequence[int], now: float) -> tuple[list[Alarm], list[Alarm]]:
@@ -106,18 +98,14 @@ class AlarmWatch:
         return begun, [self._present.pop(topic).alarm for topic in over]
 
     def _judge(self, health: Health, overloaded: Sequence[int], now: float) -> Iterator[Alarm]:
-        """What is wrong by this record, the worse one of a topic first."""
-        if self._stopped is not None and (said := self._stopped.look(health.pairing, now)) is not None:
-            yield Alarm(_STOPPED, Level.ERROR, TRIGGER, said)
-        for said in alarms(health.pairing, self._names, self._rate_hz, one_edge=self._one_edge):
-            level = Level.ERROR if said.code == _WRONG else Level.WARNING
-            topic = _TOPICS.get(said.code, f"{said.code} {said.values.get('camera', '')}")
-            yield Alarm(topic, level, PAIRING, said)
-        drifted = self._drift.look(health.pairing)
-        if drifted is not None:
-            yield Alarm(_RATE, Level.WARNING, TRIGGER, drifted)
+        """The alarms of this record, the worse one of a topic first."""
+        if self._stopped is not None and (stopped := self._stopped.look(health.pairing, now)) is not None:
+            yield stopped
+        yield from momentary(health.pairing, self._names, self._rate_hz, one_edge=self._one_edge)
+        if (drifted := self._drift.look(health.pairing)) is not None:
+            yield drifted
         if self._one_edge and (apart := spread(health, self._names)) is not None:
-            yield Alarm(_SPREAD, Level.WARNING, TRIGGER, apart)
-        for topic, name, missed in self._missing.look(health, overloaded):
-            self._remembered.add(topic)
-            yield Alarm(topic, Level.ERROR, name, missed)
+            yield apart
+        for alarm in self._missing.look(health, overloaded):
+            self._remembered.add(alarm.topic)
+            yield alarm

@@ -16,9 +16,9 @@ from rig.action import ActionCounts, ActionKeys
 from rig.clocks import NS_PER_S, DeviceNs, HostNs, host_now
 from rig.phrase import Phrase, phrase
 from rig.settings.trigger import ActionTrigger
-from triggering.sources.action import ActionPulses
 from triggering.sources.action_account import ActionAccount
 from triggering.sources.action_command import GVCP_PORT, LAST_REQUEST_ID, decode_acknowledge, encode_action
+from triggering.sources.choice import trigger_source
 from triggering.sources.gate import Gate
 from triggering.sources.ptp_time import PtpTime, ScheduledTrain
 
@@ -149,7 +149,7 @@ class ActionSender:
     # The thread
 
     def _at_once(self) -> None:
-        train = ActionPulses(self._settings).sent(self._origin)
+        train = trigger_source(self._settings).sent(self._origin)
         if train is None:
             raise RuntimeError("scheduled commands are not sent at once")
         while True:

@@ -4,7 +4,7 @@ from rig.clocks import HostNs
 
 
 class EvenTrain:
-    """Pulses at even times, each of which is a command to one camera or to all. See `seam.CommandTrain`.
+    """Pulses at even times, each of which is a command to one camera or to all. It waits for nothing itself.
 
     Args:
         origin: time of a pulse.
@@ -20,11 +20,15 @@ class EvenTrain:
         self._withheld = 0
 
     def until_next_ns(self, now: HostNs) -> int:
-        """See `triggering.sources.seam.CommandTrain.until_next_ns`."""
+        """Time from `now` to the next pulse, ns."""
         return (self._origin - now) % self._period_ns
 
     def is_due(self, now: HostNs) -> bool:
-        """See `triggering.sources.seam.CommandTrain.is_due`; only pulses since the first call after `begin` are due."""
+        """Whether the camera is to be told now to expose: once for each pulse since the first call after `begin`.
+
+        A pulse that is past by more than `latest_ns` is left out: a pulse without a frame is better than a frame that
+        belongs to no pulse.
+        """
         pulse, late_ns = divmod(now - self._origin, self._period_ns)
         if self._done is None:
             self._done = pulse
@@ -36,14 +40,19 @@ class EvenTrain:
         return in_time
 
     def begin(self) -> None:
-        """See `triggering.sources.seam.CommandTrain.begin`."""
+        """Note that the camera has just become ready, or all are: no earlier pulse is due any more."""
         self._done, self._withheld = None, 0
 
     def withheld(self) -> int:
-        """See `triggering.sources.seam.CommandTrain.withheld`."""
+        """How many pulses since the last call had no command, because it would have come too late."""
         withheld, self._withheld = self._withheld, 0
         return withheld
 
     def exposes(self, time: HostNs, within_ns: float) -> bool:
-        """See `triggering.sources.seam.CommandTrain.exposes`."""
+        """Whether a camera that was told in time can have exposed at `time`.
+
+        Args:
+            time: trigger time of a frame.
+            within_ns: limit of its error.
+        """
         return (time - self._origin + within_ns) % self._period_ns <= self._spread_ns + 2 * within_ns

@@ -20,9 +20,9 @@ from rig.transport.child import ChildContext, begin
 from rig.transport.recorder_commands import PulsesFired, TellPulses
 from rig.transport.trigger_messages import LetPulses, TriggerCommand, TriggerConfig, TriggerTold
 from service.processes.priority import MAKING_PULSES, allowed_priority, prefer_this_process
+from triggering.alarms.notices import LatenessTeller
 from triggering.sources.gate import Gate
 from triggering.sources.gpio.pulser import Pulser
-from triggering.sources.gpio.telling import LatenessTeller
 from triggering.sources.gpio.timer import Timer
 
 #: A pulse and the line that is made inactive.

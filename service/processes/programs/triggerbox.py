@@ -5,13 +5,13 @@ from typing import Final
 from rig.errors import BadInputError
 from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase
+from rig.settings.trigger import TriggerBoxTrigger
 from rig.transport.child import begin
 from rig.transport.recorder_commands import PulsesFired
 from rig.transport.trigger_messages import LetPulses, TriggerBoxConfig, TriggerCommand, TriggerTold
-from triggering.sources.choice import trigger_source
 from triggering.sources.gate import Gate
 from triggering.sources.triggerbox.keeper import Fired, TrainKeeper
-from triggering.sources.triggerbox.source import TriggerBoxPulses
+from triggering.sources.triggerbox.protocol import nearest_rate
 
 #: Time to stop the pulses.
 _GRACE_S: Final = 3.0
@@ -25,8 +25,7 @@ def main() -> None:
     """
     child = begin(TriggerBoxConfig, TriggerCommand, _GRACE_S)
     trigger = child.config.rig.trigger
-    source = trigger_source(trigger)
-    if not isinstance(source, TriggerBoxPulses):
+    if not isinstance(trigger, TriggerBoxTrigger):
         raise BadInputError('the rig has no trigger box: set trigger.source = "triggerbox" in the rig file')
 
     def tell(level: Level, said: Phrase) -> None:
@@ -46,7 +45,13 @@ def main() -> None:
     gate = Gate(still=child.config.still)
     child.on_command = obey
     keeper = TrainKeeper(
-        child.config.port, source.rate, trigger.rate_hz, gate, tell=tell, fired=fired, wait=child.stops_within
+        child.config.port,
+        nearest_rate(trigger.rate_hz),
+        trigger.rate_hz,
+        gate,
+        tell=tell,
+        fired=fired,
+        wait=child.stops_within,
     )
     keeper.run()
 

@@ -20,8 +20,8 @@ from tests.capture.rigs import SCENARIO, make_rig
 from tests.capture.station import Station
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+from triggering.sources.choice import trigger_source
 from triggering.sources.even_train import EvenTrain
-from triggering.sources.software import SoftwarePulses
 
 _FRAMES = 12
 
@@ -57,7 +57,7 @@ def test_a_camera_exposes_at_each_command(tmp_path: Path, loopback: Loopback, cl
     rig = make_rig(tmp_path, "aravis", loopback, names=["K2"], source="software", rate_hz=10.0)
     trigger, origin = rig.trigger, host_now()
     assert isinstance(trigger, SoftwareTrigger)
-    source = SoftwarePulses(trigger)
+    source = trigger_source(trigger)
 
     def opened(ring: CameraRing) -> AravisCamera:
         return AravisCamera(rig.cameras[0], rig.network, ring, trigger.period_ns, trigger)

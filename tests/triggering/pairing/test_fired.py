@@ -14,7 +14,7 @@ from rig.frame import FrameStatus
 from tests.triggering.feed import PERIOD, Feed
 from tests.triggering.oracle import ABSENT, MISSED, OK, check_no_pulse_is_mixed
 from tests.triggering.simulation import MS, Hill, Run, Scenario
-from triggering.pairing.alarms import alarms
+from triggering.alarms.momentary import momentary
 
 SETTINGS = settings(max_examples=12)
 EVERY = 100 * MS
@@ -162,7 +162,7 @@ def _trained() -> Feed:
 
 
 def _codes(feed: Feed) -> list[str]:
-    return [said.code for said in alarms(feed.pairer.health(), ["K1", "K2", "K3"], 30.0)]
+    return [alarm.said.code for alarm in momentary(feed.pairer.health(), ["K1", "K2", "K3"], 30.0)]
 
 
 def test_while_the_cable_is_off_pulses_are_missed_in_all_cameras_and_none_is_thought_dead() -> None:

@@ -12,8 +12,8 @@ from bench.triggering.hill import Case, Hill, Result
 from bench.triggering.pairing import CASES, pairing_table, run_case
 from tests.support.reliability import FaultTable
 from tests.triggering.tags import recount, tags_of
+from triggering.alarms.momentary import momentary
 from triggering.ledger.recounted import Recounted
-from triggering.pairing.alarms import alarms
 from triggering.pairing.camera.plausibility import Plausibility, Verdict
 from triggering.pairing.outcomes import ClosedPulse
 
@@ -55,7 +55,7 @@ class WatchedHill(Hill):
             self.closed.append(pulse)
             if not self.said and len(self.closed) % LOOK == 0:
                 health = self._pairer.health()
-                self.said = next((said.text for said in alarms(health, NAMES, self._case.rate_hz)), "")
+                self.said = next((alarm.said.text for alarm in momentary(health, NAMES, self._case.rate_hz)), "")
         super()._check(closed)
 
     @property

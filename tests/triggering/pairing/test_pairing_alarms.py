@@ -6,11 +6,11 @@ from rig.clocks import NS_PER_S
 from rig.phrase import Phrase
 from tests.triggering.feed import START, Feed
 from tests.triggering.simulation import MS
-from triggering.pairing.alarms import alarms
+from triggering.alarms.momentary import momentary
 
 
 def said(feed: Feed, rate_hz: float = 30.0) -> list[Phrase]:
-    return list(alarms(feed.pairer.health(), ["K1", "K2", "K3"], rate_hz))
+    return [alarm.said for alarm in momentary(feed.pairer.health(), ["K1", "K2", "K3"], rate_hz)]
 
 
 def train(feed: Feed, pulses: range, *, period: float = 1.0) -> None:
@@ -83,6 +83,6 @@ def test_two_pulses_of_which_no_camera_has_both() -> None:
     for pulse in range(31, 34):
         feed.all_cameras(pulse, [pulse + 1] * 3)
     (only,) = said(feed)
-    assert not list(alarms(feed.pairer.health(), ["K1", "K2", "K3"], 30.0, one_edge=False))
+    assert not list(momentary(feed.pairer.health(), ["K1", "K2", "K3"], 30.0, one_edge=False))
     assert only.code == "pairing_double"
     assert only.values == {"apart_ms": 3.3}

@@ -13,7 +13,7 @@ from rig.frame import Record, RecordKind
 from rig.settings.trigger import Trigger
 from triggering.pairing.pairer import ClosedPulse, Pairer
 from triggering.sources.choice import trigger_source
-from triggering.sources.seam import CommandTrain
+from triggering.sources.even_train import EvenTrain
 
 #: The `[trigger]` tables, without the rate.
 TABLES: dict[str, dict[str, Any]] = {
@@ -51,7 +51,7 @@ def test_frames_of_a_pulse_are_nearer_to_each_other_than_to_those_of_the_next(so
     assert ((made.commands(ORIGIN) or made.sent(ORIGIN)) is not None) == (source in COMMANDING)
 
 
-def _train(source: str) -> CommandTrain:
+def _train(source: str) -> EvenTrain:
     made = trigger_source(_settings(source))
     train = made.commands(ORIGIN) or made.sent(ORIGIN)
     assert train is not None

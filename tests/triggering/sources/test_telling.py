@@ -4,8 +4,8 @@ import pytest
 
 from rig.settings.trigger import ExternalTrigger, SoftwareTrigger, Trigger
 from tests.triggering.feed import Feed
+from triggering.alarms.notices import SpreadTeller, set_up_only
 from triggering.sources.choice import trigger_source
-from triggering.sources.telling import SpreadTeller, set_up_only
 
 SOFTWARE = SoftwareTrigger(source="software")
 

@@ -36,7 +36,7 @@ run: setup ## the service on the simulated hill, with its panel at http://127.0.
 bench: setup ## the benchmarks, side by side with GStreamer
 	@$(BIN)/svev bench $(ARGS)
 
-corpus: setup ## the analysis on hills drawn at random, beside the truth and the run before (docs/corpus.md)
+corpus: setup ## the analysis on hills drawn at random, beside the truth and the run before (docs/explanation/corpus.md)
 	@$(BIN)/python -m bench.corpus $(ARGS)
 
 test: setup $(NPM) ## all tests but the long ones

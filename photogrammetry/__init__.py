@@ -1,6 +1,6 @@
 """Photogrammetry for the three cameras: calibration, pose estimation, intersection, planning; numpy and scipy alone.
 
-A program needs only the names below; `docs/programs.md` shows them. They are loaded when they are first used, so that
+A program needs only the names below; `docs/how-to/programs.md` shows them. They are loaded when first used, so that
 whoever needs one module of this package does not load all.
 """
 

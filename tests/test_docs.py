@@ -130,7 +130,7 @@ def _messages() -> list[str]:
 
 
 def test_troubleshooting_quotes_the_code() -> None:
-    text = (ROOT / "docs" / "troubleshooting.md").read_text()
+    text = (ROOT / "docs" / "how-to" / "troubleshooting.md").read_text()
     quoted = re.findall(r"^### `(.*)`$", text, re.MULTILINE)
     assert len(quoted) > 20
     messages = _messages()
@@ -141,7 +141,7 @@ def test_troubleshooting_quotes_the_code() -> None:
 
 
 def test_the_survey_of_the_page_on_measuring_fits_the_simulated_hill(tmp_path: Path) -> None:
-    (example,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "measuring.md").read_text(), re.DOTALL)
+    (example,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "how-to" / "measuring.md").read_text(), re.DOTALL)
     path = tmp_path / "survey.json"
     path.write_text(example)
     scene = orient_images(training_images(), read_survey(path), training_detections())

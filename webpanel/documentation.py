@@ -25,7 +25,7 @@ With tokens, each call needs a role, which stands with its security: `watch`, `o
 
 The page may use a microphone, keep the display on and be installed over HTTPS only (or on this computer itself):
 `svev certificate --name NAME --out FOLDER` makes a certificate, `svev serve --tls-certificate FILE --tls-key FILE`
-uses it, and `docs/hill-pc.md` says how phones come to trust it.
+uses it, and `docs/how-to/hill-pc.md` says how phones come to trust it.
 
 Every error is a problem (RFC 9457, `application/problem+json`): `code` is stable, `detail` says what to do.
 """

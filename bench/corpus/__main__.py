@@ -1,4 +1,4 @@
-"""Measures scenes of the corpus: `python -m bench.corpus` (`make corpus`). See docs/corpus.md."""
+"""Measures scenes of the corpus: `python -m bench.corpus` (`make corpus`). See docs/explanation/corpus.md."""
 
 import argparse
 import os

@@ -147,5 +147,5 @@ def _permission(denied: list[Path]) -> str:
     names = ", ".join(str(path) for path in denied)
     return (
         f"no right to use the FireWire devices {names}: run: sudo usermod -aG video $USER, then log in again "
-        "(and see docs/firewire.md for the udev rule)"
+        "(and see docs/how-to/firewire.md for the udev rule)"
     )

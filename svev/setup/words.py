@@ -118,8 +118,8 @@ _WORDS: Final[dict[str, tuple[str, str]]] = {
         "nøkkelen, som hver telefon spør om én gang: {token}",
     ),
     "authority": (
-        "phones trust it when {path} is installed on them: docs/hill-pc.md says how",
-        "telefonene stoler på den når {path} er installert på dem: docs/hill-pc.md sier hvordan",
+        "phones trust it when {path} is installed on them: docs/how-to/hill-pc.md says how",
+        "telefonene stoler på den når {path} er installert på dem: docs/how-to/hill-pc.md sier hvordan",
     ),
     "start_by_hand": ("start it: {command}", "start den: {command}"),
     "needs_root": (

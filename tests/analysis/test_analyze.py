@@ -121,7 +121,7 @@ def _the_example_of_the_documentation_runs(
     jump: HillLog, out: Path, again: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """As it stands there, except that it does not look for the jumper once more."""
-    page = Path(__file__).resolve().parents[2] / "docs" / "measuring.md"
+    page = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "measuring.md"
     (example,) = re.findall(r"```python\n(from pathlib .*?)```", page.read_text(), re.DOTALL)
     known = functools.partial(analyze, by_hand=read_measurements(out / "measurements.json"), images=False)
     monkeypatch.setattr("analysis.procedure.analyze.analyze", known)

@@ -19,7 +19,7 @@ from season.tables.questions import QUESTIONS
 from svev.commands.jumps.season_tables import aligned, group_rows
 from tests.season.drawn import Drawn, draw_season
 
-DOCS = Path(__file__).parents[2] / "docs" / "season.md"
+DOCS = Path(__file__).parents[2] / "docs" / "how-to" / "season.md"
 
 
 @pytest.fixture(scope="module")

@@ -35,7 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Options of our own."""
     parser.addoption("--hardware", action="store_true", help="also run the tests that need real cameras")
     parser.addoption(
-        "--write-reliability", action="store_true", help="write what faults come to into docs/reliability.md"
+        "--write-reliability", action="store_true", help="write the table of docs/explanation/reliability.md"
     )
     parser.addoption("--cost", action="store_true", help="show the CPU-seconds of tests with all that they started")
     parser.addoption("--leak-grace", type=float, default=2.0, help="seconds that what a test started has to go away")

@@ -1,4 +1,4 @@
-"""The table of faults in `docs/reliability.md`: tests of faults fill it in, and check it.
+"""The table of faults in `docs/explanation/reliability.md`: tests of faults fill it in, and check it.
 
 A test that brings a fault about tells what came of it. Normally the row of that fault in the document must say the
 same; with `--write-reliability` the rows of the document are written anew from what the tests tell.
@@ -12,7 +12,7 @@ from typing import Final
 
 import pytest
 
-DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "reliability.md"
+DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "explanation" / "reliability.md"
 _BEGIN: Final = "<!-- table of faults: written by pytest --write-reliability, do not edit -->"
 _END: Final = "<!-- end of the table of faults -->"
 _HEAD: Final = "| fault | pulses lost | what is said | exit code |\n|---|---|---|---|\n"

@@ -1,4 +1,4 @@
-"""The table of all keys in `docs/rig-file.md`, made from the JSON schema of the rig file.
+"""The table of all keys in `docs/reference/rig-file.md`, made from the JSON schema of the rig file.
 
 `python -m tests.support.rig_keys` writes it anew; a test compares it with the page.
 """
@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from rig.settings.file import rig_schema
 
-PAGE: Final = Path(__file__).resolve().parents[2] / "docs" / "rig-file.md"
+PAGE: Final = Path(__file__).resolve().parents[2] / "docs" / "reference" / "rig-file.md"
 _BEGIN: Final = "<!-- all keys: written by python -m tests.support.rig_keys, do not edit -->"
 _END: Final = "<!-- end of all keys -->"
 _HEAD: Final = "| key | unit | if left out | values | is |\n|---|---|---|---|---|\n"

@@ -12,7 +12,7 @@ from rig.settings.file import CONFIG, load_rig
 from tests.systemd.prefixes import units_into
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "hill-pc.md").read_text()
+PAGE = (ROOT / "docs" / "how-to" / "hill-pc.md").read_text()
 _NETWORKD = Path("/lib/systemd/systemd-networkd")
 
 

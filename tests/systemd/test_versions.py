@@ -53,8 +53,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             archive.writestr(name, text)
         archive.writestr("svev-9.dist-info/RECORD", "".join(f"{name},,\n" for name in _PACKAGE))
     shutil.copytree(SYSTEMD, bundle / "systemd")
-    (bundle / "docs").mkdir()
-    (bundle / "docs" / "hill-pc.md").touch()
+    (bundle / "docs" / "how-to").mkdir(parents=True)
+    (bundle / "docs" / "how-to" / "hill-pc.md").touch()
     (bundle / "config" / "rigs").mkdir(parents=True)
     (bundle / "config" / "rigs" / "hill-gige.toml").write_text("fine")
     (bundle / "requirements.txt").write_text(

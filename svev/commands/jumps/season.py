@@ -151,7 +151,7 @@ def query_command(
     ] = "athlete,hill",
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
-    """Ask the tables of a season: jumps, pulses, cameras, logs (columns: docs/season.md). Nothing can be changed by it.
+    """Ask the tables of a season: jumps, pulses, cameras, logs (columns: docs/how-to/season.md). Changes nothing.
 
     `--ask athletes` gives means with their sigma, and a star where an athlete differs from the others of the same days,
     corrected for how many are compared.

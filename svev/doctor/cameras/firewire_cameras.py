@@ -19,7 +19,7 @@ from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, 
 def told(message: str) -> Finding:
     """The finding FAIL of an error message of ours, which is "what is wrong: what to do"."""
     what, _, remedy = message.removeprefix("camera ").partition(": ")
-    remedy = remedy or "see docs/firewire.md"
+    remedy = remedy or "see docs/how-to/firewire.md"
     return failure(Topic.CAMERAS, "check_camera_refuses", "{what}", "{remedy}", what=what, remedy=remedy)
 
 

@@ -1,6 +1,6 @@
 """Tries one FireWire camera: sets it up as for a recording, takes frames for two seconds, resets the bus.
 
-On the first day with real cameras this answers what the emulated bus cannot show; docs/firewire.md has the list.
+On the first day with real cameras this answers what the emulated bus cannot show; docs/how-to/firewire.md has the list.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ _RATE_SHARE: Final = 0.02
 _DELAY_NS: Final = 1_000_000
 #: A busy computer takes frames late: the trial is repeated before a delay is called wrong.
 _DELAY_TRIALS: Final = 3
-_MANUAL: Final = "see docs/firewire.md, the first day with real cameras"
+_MANUAL: Final = "see docs/how-to/firewire.md, the first day with real cameras"
 _AFTER_RESET: Final = "recordings connect it again by themselves; do not touch cables meanwhile"
 
 

@@ -15,7 +15,7 @@ from analysis.measurements.model import JumpMeasurements, MeasuredCamera, Measur
 from rig.errors import BadInputError
 from tests.analysis.simulated import simulated_measurements, true_cameras, true_jump
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "measurements-file.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "measurements-file.md"
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The table of makers in docs/cameras.md: by which features each camera is set up, asked of the camera that is open.
+"""The table of makers in docs/reference/cameras.md: the features by which each camera is set up, asked of it.
 
 `python -m tests.capture.aravis.makers_table` writes it anew. With `SVEV_GENICAM_DIR` it prints a row for each
 description (`*.xml`) in that folder as well.
@@ -21,7 +21,7 @@ from tests.capture.aravis.described import described, descriptions
 from tests.capture.aravis.test_makers import make
 from tests.support.loopback import Loopback
 
-PAGE: Final = Path(__file__).parents[3] / "docs" / "cameras.md"
+PAGE: Final = Path(__file__).parents[3] / "docs" / "reference" / "cameras.md"
 BEGIN, END = "<!-- made by tests/capture/aravis/makers_table.py -->\n", "<!-- end -->\n"
 _HEAD: Final = (
     "camera", "source", "trigger", "exposure", "gain", "rate", "actions", "PTP", "temperature", "bandwidth",

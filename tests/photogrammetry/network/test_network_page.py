@@ -20,7 +20,7 @@ from rig.settings.file import CONFIG
 from rig.settings.strict_toml import StrictModel
 from svev.cli import main
 
-PAGE = (Path(__file__).resolve().parents[3] / "docs" / "network-file.md").read_text()
+PAGE = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "network-file.md").read_text()
 TRY_IT = PAGE.split("## Try it", 1)[1].split("\n## ", 1)[0]
 PLANS = {"laboratory": "laboratory", "hill": "hill-2", "rods": "rods"}
 

@@ -29,7 +29,7 @@ from svev.cli import main
 from tests.photogrammetry.drawn import SVG, bar, chart_scales, parsed, polyline
 
 NETWORKS = CONFIG / "networks"
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "planning.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "planning.md"
 
 
 def _planned(name: str) -> tuple[Plan, Adjustment, Sigmas]:

@@ -1,6 +1,6 @@
 """The fault matrix of the FireWire cameras: each fault is made to happen, and what the log says of it becomes a row.
 
-    .venv/bin/python -m tests.service.cameras.firewire_matrix    writes the rows into docs/firewire.md
+    .venv/bin/python -m tests.service.cameras.firewire_matrix    writes the rows into docs/how-to/firewire.md
 
 Each fault befalls K2 in a recording of its own of the same running rig: three emulated Marlins, 15 pulses per second.
 """
@@ -33,7 +33,7 @@ from simrig.programs.simulated_hill import SimulatedHill
 from simrig.world.faults import Fault
 from tests.support.stamps import hill_pulses
 
-PAGE: Final = Path(__file__).resolve().parents[3] / "docs" / "firewire.md"
+PAGE: Final = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "firewire.md"
 BEGIN: Final = "<!-- fault matrix: written by tests.service.cameras.firewire_matrix, do not edit -->"
 END: Final = "<!-- end of the fault matrix -->"
 RATE_HZ: Final = 15.0

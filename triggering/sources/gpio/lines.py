@@ -56,7 +56,7 @@ def open_chip(path: Path) -> gpiod.Chip:
     except PermissionError:
         text = (
             "GPIO chip {chip} may not be opened by this user: sudo usermod -aG gpio $USER and log in again; without a "
-            "group gpio, make one and a udev rule for it (docs/hill-pc.md)"
+            "group gpio, make one and a udev rule for it (docs/how-to/hill-pc.md)"
         )
         raise TriggerError(phrase("gpio_not_permitted", text, chip=str(path))) from None
     except OSError as error:

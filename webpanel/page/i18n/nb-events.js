@@ -242,7 +242,7 @@ export const events = {
   gpio_two_chips: ["GPIO-brikke {chip}: {chips} har dette merket", "sett en av dem som trigger.chip i riggfilen"],
   broadcast_fails: ["kommandoer til FireWire-kameraene lar seg ikke gi: {why}"],
   gpio_chip_missing: ["GPIO-brikke {chip} finnes ikke", "sett en som gpiodetect viser, som trigger.chip i riggfilen"],
-  gpio_not_permitted: ["GPIO-brikke {chip} kan ikke åpnes av denne brukeren", "sudo usermod -aG gpio $USER, og logg inn på nytt; uten gruppen gpio, se docs/hill-pc.md"],
+  gpio_not_permitted: ["GPIO-brikke {chip} kan ikke åpnes av denne brukeren", "sudo usermod -aG gpio $USER, og logg inn på nytt; uten gruppen gpio, se docs/how-to/hill-pc.md"],
   gpio_no_chip: ["GPIO-brikke {chip} kan ikke åpnes ({why})", "sett en som gpiodetect viser, som trigger.chip i riggfilen"],
   gpio_no_line: ["GPIO-brikke {chip} har ingen linje {line}, men linje 0 til {last}", "sett en som gpioinfo viser, i riggfilen"],
   gpio_taken: ["{line} er opptatt av {consumer}", "avslutt det, eller sett en annen linje i riggfilen"],

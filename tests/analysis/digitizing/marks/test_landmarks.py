@@ -37,7 +37,7 @@ def test_the_file_beside_the_recordings_is_taken(desk: Desk) -> None:
 
 
 def test_the_documentation_shows_the_example() -> None:
-    shown = re.search(r"boots.toml -->\n```toml\n(.*?)```", Path("docs/digitizing.md").read_text(), re.DOTALL)
+    shown = re.search(r"boots.toml -->\n```toml\n(.*?)```", Path("docs/how-to/digitizing.md").read_text(), re.DOTALL)
     assert shown is not None
     assert shown[1] in EXAMPLE.read_text()
 

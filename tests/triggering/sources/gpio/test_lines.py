@@ -121,7 +121,7 @@ said(lambda: OutputLine("/dev/null", 1, active_low=False))
             "GPIO chip gpiochip0 has no line 2, but lines 0 to 1: name one that gpioinfo lists in the rig file",
             "GPIO chip gpiochip0 has no line GATE, but lines 0 to 1: name one that gpioinfo lists in the rig file",
             ("GPIO chip gpiochip1 may not be opened by this user: sudo usermod -aG gpio $USER and log in again; "
-            "without a group gpio, make one and a udev rule for it (docs/hill-pc.md)"),
+            "without a group gpio, make one and a udev rule for it (docs/how-to/hill-pc.md)"),
             "GPIO chip gpiochip9 is not there: name one that gpiodetect lists as trigger.chip in the rig file",
             ("GPIO chip /dev/null cannot be opened (No such device): name one that gpiodetect lists as trigger.chip "
             "in the rig file"),

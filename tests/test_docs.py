@@ -45,6 +45,7 @@ SOURCES = [
     )
     for path in (ROOT / room).rglob("*.py")
 ]
+DECISIONS = sorted((ROOT / "docs" / "decisions").glob("0*.md"))
 FENCE = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
 RUN = re.compile(
     r"<!-- run(?: beside svev (?:replay(?P<replay>.*?)|(?P<serve>serve)))?, prints: (?P<prints>.*?) -->\n"
@@ -138,6 +139,30 @@ def test_troubleshooting_quotes_the_code() -> None:
         pieces = [re.escape(piece.strip()) for piece in words.split("…") if piece.strip()]
         pattern = re.compile(".*".join(pieces), re.DOTALL)
         assert any(pattern.search(message) for message in messages), words
+
+
+@pytest.mark.parametrize("page", DECISIONS, ids=_name)
+def test_decisions_are_choices_and_indexed_by_their_titles(page: Path) -> None:
+    text = page.read_text()
+    number, title = text.splitlines()[0].removeprefix("# ").split(": ", 1)
+    assert page.name.startswith(number)
+    assert re.search(r"^Status: (accepted|superseded)\b", text, re.MULTILINE)
+    for part in ("Context", "Decision", "Consequences"):
+        assert re.search(rf"^\*\*{part}\.\*\*", text, re.MULTILINE), part
+    index = (page.parent / "README.md").read_text()
+    assert index.count(f"| [{number}]({page.name}) | {title} |") == 1
+
+
+def test_every_page_is_on_the_way_from_the_door() -> None:
+    known, ahead = set[Path](), [ROOT / "docs" / "index.md"]
+    while ahead:
+        page = ahead.pop()
+        if page in known or page.suffix != ".md":
+            continue
+        known.add(page)
+        links = re.findall(r"\]\(([^)#]+\.md)", page.read_text())
+        ahead += [(page.parent / link).resolve() for link in links if not link.startswith("https://")]
+    assert set(PAGES) <= known
 
 
 def test_the_survey_of_the_page_on_measuring_fits_the_simulated_hill(tmp_path: Path) -> None:

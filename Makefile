@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench corpus test test-long check style wheel bundle install rollback uninstall lock client-tool clean setup system
+.PHONY: help demo run bench corpus test test-long check style wheel bundle install rollback uninstall lock client-tool docs clean setup system
 
 # Some environments forbid Python to keep what it compiled: then each of the thousands of processes of the tests, and each
 # call of pytest, would compile the program anew.
@@ -22,6 +22,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 VENV := .venv/.setup-venv
 LOCKED := .venv/.setup-locked
 SVEV := .venv/.setup-svev
+DOCS := build/docs/env/.setup-docs
 NPM := $(patsubst %/package-lock.json,%/node_modules/.setup-npm,$(wildcard tests/*/npm/package-lock.json))
 
 help: ## list the targets
@@ -74,10 +75,17 @@ lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
 	@test -x build/uv/bin/uv || { /usr/bin/python3 -m venv build/uv && build/uv/bin/pip install -qq uv; }
 	@build/uv/bin/uv pip compile pyproject.toml --group dev --python-version 3.11 --quiet --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --output-file requirements.lock $(ARGS)
+	@build/uv/bin/uv pip compile .ci/docs/requirements.in --python-version 3.11 --quiet --generate-hashes \
+	  --no-emit-index-url --no-header --no-annotate --output-file .ci/docs/requirements.lock $(ARGS)
 
 client-tool: ## for the test that makes a client of the REST API: openapi-python-client, in an environment of its own
 	@test -x build/client-tool/bin/openapi-python-client || { /usr/bin/python3 -m venv build/client-tool && \
 	  build/client-tool/bin/pip install -qq openapi-python-client; }
+
+docs: setup $(DOCS) ## the documentation as a site in build/site, with search; a link that leads nowhere is an error
+	@$(BIN)/python -m tests.support.rest_description build/docs/openapi.json
+	@NO_MKDOCS_2_WARNING=1 build/docs/env/bin/mkdocs build --strict --config-file .ci/docs/mkdocs.yml
+	@echo "open build/site/index.html"
 
 clean: ## remove everything that make made; keep recordings
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
@@ -89,7 +97,7 @@ setup: $(SVEV) ## the program in .venv, to look around: .venv/bin/svev --help
 
 # Who only looks or installs needs neither compiler nor browser nor Node.
 system:
-	@.ci/system-packages $(if $(filter-out setup demo run bundle install,$(MAKECMDGOALS)),develop,run)
+	@.ci/system-packages $(if $(filter-out setup demo run bundle install docs,$(MAKECMDGOALS)),develop,run)
 
 $(VENV): | system
 	@echo "setting up .venv from the distribution's Python"
@@ -103,6 +111,13 @@ $(LOCKED): requirements.lock $(VENV)
 
 $(SVEV): pyproject.toml $(LOCKED) | system
 	@$(PIP) install -qq --no-deps --no-build-isolation -e .
+	@touch $@
+
+# In an environment of its own: a site generator is no part of the program.
+$(DOCS): .ci/docs/requirements.lock
+	@echo "installing the site generator"
+	@/usr/bin/python3 -m venv --clear build/docs/env
+	@build/docs/env/bin/pip --disable-pip-version-check --no-input install -qq --require-hashes -r $<
 	@touch $@
 
 %/node_modules/.setup-npm: %/package-lock.json | system

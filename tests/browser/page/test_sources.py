@@ -57,6 +57,8 @@ COMPOSED = (
 )
 #: Ends of the names of the modules that hold words: "", "-check" and so on.
 PARTS = sorted(path.stem.removeprefix("en") for path in (PAGE / "i18n").glob("en*.js"))
+#: Dialogs that belong to a view.
+DIALOGS = {"list-preview": "live", "kinogram-large": "recording"}
 #: The rooms whose sentences reach the page.
 SPEAKING = ("rig", "capture", "triggering", "recorder", "analysis", "service", "webpanel", "svev")
 #: Which argument of these calls is the code; the templates follow it.
@@ -105,6 +107,72 @@ def test_every_key_that_is_used_has_words_and_the_other_way_round() -> None:
     called = set(re.findall(r'\bt\("([^"]+)"', sources))
     assert used | called <= set(english)
     assert {key for key in english if not key.startswith(COMPOSED)} <= used | called
+
+
+def _loaded_with(entry: Path) -> set[Path]:
+    """All modules that come with one."""
+    loaded, found = set[Path](), {entry}
+    while found:
+        loaded |= found
+        found = set[Path]().union(*map(_imported, found)) - loaded
+    return loaded
+
+
+def _words_used(sources: str) -> set[str]:
+    """Keys that are written out or put together in sources."""
+    english = set(_words("en"))
+    used = set(re.findall(r'data-t(?:-label|-placeholder)?="([^"]+)"', sources))
+    used |= set(re.findall(r'"([a-z_]+(?:\.\w+)*)"', sources)) & english
+    begun = tuple(re.findall(r"`([a-z]+\.(?:[a-z_]+)?)\$\{", sources))
+    return used | {key for key in english if begun and key.startswith(begun)}
+
+
+def _words_of(*parts: str) -> set[str]:
+    names = [f"en-{part}.js" if part else "en.js" for part in parts]
+    return {key for name in names for key, _ in WORDS.findall((PAGE / "i18n" / name).read_text())}
+
+
+def _parts() -> list[tuple[list[str], Path, list[str]]]:
+    """Views, entry and sets of words of the parts of the page."""
+    table = PAGE / "parts" / "parts.js"
+    row = r'views: \[(.*?)\], module: \(\) => import\("\./(.*?)"\), words: \[(.*?)\],'
+    return [
+        (re.findall(r'"(\w+)"', views), table.with_name(entry), re.findall(r'"(\w+)"', words))
+        for views, entry, words in re.findall(row, table.read_text())
+    ]
+
+
+def test_each_part_of_the_page_loads_the_words_that_it_uses() -> None:
+    document = (PAGE / "index.html").read_text()
+    inner = {
+        found[2]: found[0]
+        for found in re.finditer(
+            r'^ *<(section class="view"|dialog)[^>]*? id="([\w-]+)".*?^  (?:  )?</(?:section|dialog)>',
+            document,
+            re.MULTILINE | re.DOTALL,
+        )
+    }
+    parts = _parts()
+    around = set(inner) - {view for views, _, _ in parts for view in views} - set(DIALOGS)
+    assert around == {"loading", "settings", "confirm", "login"}
+    frame = _loaded_with(PAGE / "main.js")
+    for name in set(inner) - around:
+        document = document.replace(inner[name], "")
+    said = "\n".join([document, *(module.read_text() for module in frame)])
+    assert _words_used(said) <= _words_of("")
+    assert len(parts) == 10
+    for views, entry, words in parts:
+        shown = [inner[name] for name in (*views, *(dialog for dialog, view in DIALOGS.items() if view in views))]
+        said = "\n".join([*shown, *(module.read_text() for module in _loaded_with(entry) - frame)])
+        assert _words_used(said) <= _words_of("", *words), entry.name
+
+
+def test_the_page_of_measuring_by_hand_loads_the_words_that_it_uses() -> None:
+    entry = PAGE / "digitize" / "main.js"
+    found = re.search(r"startLanguage\((.*)\);", entry.read_text())
+    assert found
+    said = [(PAGE / "digitize.html").read_text(), *(module.read_text() for module in _loaded_with(entry))]
+    assert _words_used("\n".join(said)) <= _words_of("", *re.findall(r'"(\w+)"', found[1]))
 
 
 def _translated() -> dict[str, str]:
@@ -257,18 +325,31 @@ def test_the_shapes_are_those_of_the_api(name: str) -> None:
     assert _types()[name] == fields
 
 
+def _imported(module: Path) -> set[Path]:
+    """The modules that a module cannot do without."""
+    found = re.findall(r'^(?:import|export) .* from "(.+)";$', module.read_text(), re.MULTILINE)
+    return {(module.parent / target).resolve() for target in found}
+
+
+def _imported_later(module: Path) -> set[Path]:
+    """The modules that it loads while it runs, if their names are written out."""
+    return {(module.parent / target).resolve() for target in re.findall(r'=> import\("(.+?)"\)', module.read_text())}
+
+
 def test_modules_import_each_other_one_way() -> None:
-    """Views see what is shared, never each other; only what is around them (`frame`, `main.js`) sees several."""
+    """Views see what is shared, never each other; only `parts`, what is behind each view, sees several."""
     hand = ("session", "marking", "views", "cards")  # of measuring by hand, each sees those before it
+    views = ("athletes", "jump", "live", "recordings", "system", "viewing")
     sees = {
-        "": {"athletes", "frame", "i18n", "jump", "live", "recordings", "shared", "system", "viewing"},
+        "": {"frame", "i18n", "parts", "shared"},
+        "parts": {*views, "parts", "i18n", "shared"},
         "digitize": {*(f"digitize/{room}" for room in hand), "digitize", "frame", "i18n", "shared"},
         **{
             f"digitize/{room}": {*(f"digitize/{seen}" for seen in hand[: k + 1]), "i18n", "shared"}
             for k, room in enumerate(hand)
         },
-        "frame": {"frame", "i18n", "live", "recordings", "shared", "viewing"},
-        **{view: {view, "i18n", "shared"} for view in ("athletes", "jump", "live", "system", "viewing")},
+        "frame": {"frame", "i18n", "shared"},
+        **{view: {view, "i18n", "shared"} for view in views},
         "recordings": {"recordings", "viewing", "i18n", "shared"},
         "shared": {"i18n", "shared"},
         "i18n": {"i18n", "shared"},
@@ -276,8 +357,7 @@ def test_modules_import_each_other_one_way() -> None:
     imports: dict[str, set[str]] = {}
     for module in MODULES:
         name = module.relative_to(PAGE).as_posix()
-        found = re.findall(r'^import .* from "(.+)";$', module.read_text(), re.MULTILINE)
-        imports[name] = {(module.parent / target).resolve().relative_to(PAGE).as_posix() for target in found}
+        imports[name] = {target.relative_to(PAGE).as_posix() for target in _imported(module) | _imported_later(module)}
         assert {target.rpartition("/")[0] for target in imports[name]} <= sees[name.rpartition("/")[0]], name
     tuple(TopologicalSorter(imports).static_order())  # raises CycleError
 

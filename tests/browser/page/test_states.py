@@ -59,8 +59,10 @@ def test_a_key_acts_on_the_view_that_the_key_before_it_opened(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:
     service._become(State.ARMED)
-    page = open_page(f"{panel.url}/#/log")
+    page = open_page(panel.url)
     expect(page.locator("#state-word")).to_have_text("Armed")
+    page.keyboard.press("l")
+    expect(page.locator("#log")).to_be_visible()
     page.evaluate("""() => {
         for (const key of ["v", "x"]) document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
     }""")

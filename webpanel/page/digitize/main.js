@@ -28,7 +28,7 @@ import { cameras, change, redraw, state, watch } from "./session/state.js";
 import { startPanes } from "./views/panes.js";
 import { startPicture } from "./views/picture.js";
 
-startLanguage();
+await startLanguage("digitize", "recording", "measuring");
 startLogin(() => location.reload());
 void begin();
 

@@ -1,53 +1,54 @@
 /** The keyboard: one table of what each key does and what the help says about it. */
 
 import { t } from "../i18n/i18n.js";
-import { disarm, nextStep, saveLast } from "../live/actions.js";
-import { showCamera, shownCamera } from "../live/preview.js";
-import { nextJumper } from "../live/session.js";
-import { deleteShown } from "../recordings/recording.js";
 import { $, make } from "../shared/dom.js";
 import { go } from "../shared/router.js";
 import { clearSnacks } from "../shared/snacks.js";
 import { known, load, save } from "../shared/store.js";
-import { beginNote } from "../viewing/notes.js";
-import { canScrub, chooseCamera, nextGap, playerInUse, step, toEnd, toMoment, togglePlay } from "../viewing/scrubber.js";
 import { openSettings } from "./settings.js";
 
-const STEP = 10;
 const DIGITS = ["0", "1", "2", "3", "4", "5", "6", "7", "8"];
 
-/** @typedef {{ keys: string[], words: string, action: (event: KeyboardEvent) => void, view?: string }} Key */
+/** @typedef {{ keys: string[], words: string, action?: (event: KeyboardEvent) => void, view?: string }} Key `view`: the one whose part knows what they do */
 
 /** @type {Key[]} */
 const KEYS = [
-  { keys: ["r"], words: "keys.next_step", action: nextStep, view: "live" },
-  { keys: ["s"], words: "keys.save_last", action: saveLast, view: "live" },
-  { keys: ["n"], words: "keys.next_jumper", action: nextJumper, view: "live" },
-  { keys: ["x"], words: "keys.disarm", action: disarm, view: "live" },
-  { keys: DIGITS, words: "keys.camera", action: (event) => camera(Number(event.key)), view: "live" },
+  { keys: ["r"], words: "keys.next_step", view: "live" },
+  { keys: ["s"], words: "keys.save_last", view: "live" },
+  { keys: ["n"], words: "keys.next_jumper", view: "live" },
+  { keys: ["x"], words: "keys.disarm", view: "live" },
+  { keys: DIGITS, words: "keys.camera", view: "live" },
   { keys: ["v"], words: "keys.live", action: () => go("live") },
   { keys: ["j"], words: "keys.recordings", action: () => go("recordings") },
   { keys: ["l"], words: "keys.log", action: () => go("log") },
   { keys: ["c"], words: "keys.doctor", action: () => go("doctor") },
   { keys: ["i"], words: "keys.rig", action: () => go("rig") },
-  { keys: ["ArrowLeft", "ArrowRight"], words: "keys.frame", action: (event) => step((event.key === "ArrowLeft" ? -1 : 1) * (event.shiftKey ? STEP : 1)), view: "recording" },
-  { keys: ["Home", "End"], words: "keys.ends", action: (event) => toEnd(event.key === "End"), view: "recording" },
-  { keys: [" "], words: "keys.play", action: togglePlay, view: "recording" },
-  { keys: ["g"], words: "keys.gap", action: () => nextGap(1), view: "recording" },
-  { keys: ["t"], words: "keys.moment", action: toMoment, view: "recording" },
-  { keys: ["o"], words: "keys.loop", action: () => playerInUse().toggleLoop(), view: "recording" },
-  { keys: ["-", "+"], words: "keys.speed", action: (event) => playerInUse().changeSpeed(event.key === "-" ? 1 : -1), view: "recording" },
-  { keys: ["m"], words: "keys.note", action: beginNote, view: "recording" },
-  { keys: DIGITS, words: "keys.camera", action: (event) => chooseCamera(Number(event.key) ? Number(event.key) - 1 : null), view: "recording" },
-  { keys: ["Delete"], words: "keys.delete", action: () => { if (known.role === "administer") void deleteShown(); }, view: "recording" },
+  { keys: ["ArrowLeft", "ArrowRight"], words: "keys.frame", view: "recording" },
+  { keys: ["Home", "End"], words: "keys.ends", view: "recording" },
+  { keys: [" "], words: "keys.play", view: "recording" },
+  { keys: ["g"], words: "keys.gap", view: "recording" },
+  { keys: ["t"], words: "keys.moment", view: "recording" },
+  { keys: ["o"], words: "keys.loop", view: "recording" },
+  { keys: ["-", "+"], words: "keys.speed", view: "recording" },
+  { keys: ["m"], words: "keys.note", view: "recording" },
+  { keys: DIGITS, words: "keys.camera", view: "recording" },
+  { keys: ["Delete"], words: "keys.delete", view: "recording" },
   { keys: ["Escape"], words: "keys.escape", action: escape },
   { keys: ["?"], words: "keys.help", action: openSettings },
 ];
 
+/** @type {() => Record<string, (event: KeyboardEvent) => void>} */
+let actionsHere = () => ({});
+
 /** How the help writes keys whose name is not what they print. */
 const CAPS = /** @type {Record<string, string>} */ ({ ArrowLeft: "←", ArrowRight: "→", " ": "keys.cap_space" });
 
-export function startKeys() {
+/**
+ * @param {() => Record<string, (event: KeyboardEvent) => void>} actions what keys do in the view that is shown, by the key of
+ *   their words
+ */
+export function startKeys(actions) {
+  actionsHere = actions;
   addEventListener("keydown", pressed);
   drawKeys();
   $("keys-on").checked = load("keys", true);
@@ -73,19 +74,14 @@ function pressed(event) {
   if (!$("keys-on").checked && !["?", "Escape", "ArrowLeft", "ArrowRight"].includes(event.key)) return;
   if (event.key === " " && on.matches("button, a")) return; // the key presses that button
   const key = KEYS.find(({ keys, view }) => keys.includes(event.key) && (!view || view === known.view));
-  if (!key || event.repeat && !event.key.startsWith("Arrow") || key.view === "recording" && !canScrub() && key.words !== "keys.delete") return;
+  const action = key && (key.action ?? actionsHere()[key.words]);
+  if (!action || event.repeat && !event.key.startsWith("Arrow")) return;
   event.preventDefault();
-  key.action(event);
+  action(event);
 }
 
-/** @param {number} digit 0: all */
-function camera(digit) {
-  const index = digit - 1;
-  showCamera(digit === 0 || index === shownCamera() ? null : index);
-}
-
-function escape() {
+/** @param {KeyboardEvent} event */
+function escape(event) {
   clearSnacks();
-  if (known.view === "recording") go("recordings");
-  if (known.view === "live") showCamera(null);
+  actionsHere()["keys.escape"]?.(event);
 }

@@ -2,6 +2,7 @@
 
 import { chooseLanguage, languageInUse, t } from "../i18n/i18n.js";
 import { $, setText } from "../shared/dom.js";
+import { attempt } from "../shared/snacks.js";
 import { known, load, save } from "../shared/store.js";
 
 /**
@@ -17,7 +18,14 @@ export function startSettings(redraw) {
   $("settings").addEventListener("click", (/** @type {MouseEvent} */ event) => {
     if (event.target === $("settings")) $("settings").close(); // the dimmed page around it
   });
-  $("language").addEventListener("change", () => { chooseLanguage($("language").value); redraw(); draw(); });
+  $("language").addEventListener("change", () => void attempt(async () => {
+    try {
+      await chooseLanguage($("language").value);
+      redraw();
+    } finally {
+      draw();
+    }
+  }));
   $("look").addEventListener("change", () => { save("look", $("look").value); setLook($("look").value); });
 }
 

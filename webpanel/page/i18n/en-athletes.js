@@ -1,6 +1,5 @@
 /** English words of athletes and sessions. Every key stands in nb-athletes.js too (a test looks). */
-export const athletes = {
-  "athletes.session": "Table of the day",
+export const words = {
   "athletes.day": "Day",
   "athletes.everybody": "Everybody",
   "athletes.csv": "Table for Excel (CSV)",
@@ -23,16 +22,6 @@ export const athletes = {
   "athletes.never": "Never measured.",
   "athletes.chart": "{title}: mean of {count} well measured jumps {mean} {unit}",
   "athletes.legend": "Dots: jumps, each with its standard deviation; hollow ones are doubtful or only measured live. Line and band: mean of the day, and how its well measured jumps scatter.",
-  "athletes.of": "All jumps of {athlete}",
-
-  "compare.view": "How two jumps are shown",
-  "compare.beside": "Side by side",
-  "compare.ghost": "Ghost",
-  "compare.page": "What differs",
-  "compare.by_takeoff": "Aligned at the measured take-off of both.",
-  "compare.by_motion": "Aligned where most moves in each: the take-off was not measured of both.",
-  "compare.by_beginning": "Both from their beginning: nothing moves in one of them.",
-  "compare.no_ghost": "No ghost: they have not the same cameras.",
 
   "spans.title": "Better than chance?",
   "spans.lead": "Compares all well measured jumps of two days or spans, by the same test as two jumps are compared with: the greatest of many differences must be greater than chance makes it.",

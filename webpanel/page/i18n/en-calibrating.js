@@ -1,5 +1,5 @@
 /** English words of the calibration helper. Every key stands in nb-calibrating.js too (a test looks). */
-export const calibrating = {
+export const words = {
   "calibrating.title": "Calibrate by a printed target",
   "calibrating.hint": "Print a board with svev target. Move it slowly before the camera and hold it still now and then: a picture is kept by itself. All cameras that see it count.",
   "calibrating.printed": "What was printed",

@@ -1,5 +1,5 @@
 /** English words of the views that check and set up the rig. Every key stands in nb-check.js too (a test looks). */
-export const check = {
+export const words = {
   "rehearsal.title": "Rehearsal",
   "rehearsal.lead": "Records for five seconds with everything that a jump needs, reads it back, says whether it will do, and deletes it. The cameras must be off.",
   "rehearsal.run": "Rehearse",
@@ -22,7 +22,6 @@ export const check = {
   "rehearsal.pulses": "Pulses, complete",
   "rehearsal.everything": "Everything that was examined",
 
-  "aim.open": "Focus",
   "aim.title": "Focus",
   "aim.back": "Back to the live view",
   "aim.when_armed": "Arm the rig: then the pictures come.",
@@ -103,4 +102,23 @@ export const check = {
   "pulses.kept": "The rate is kept in the rig file.",
   "aim.not_there": "{camera} has no picture in that recording.",
   "aim.other_size": "That picture has another size: the camera's region was changed since.",
+
+  "doctor.title": "Check the rig",
+  "doctor.lead": "Looks at everything that a recording stands on: cameras, network, disk, computer. Takes some seconds.",
+  "doctor.run": "Check now",
+  "doctor.again": "Check again",
+  "doctor.looking": "Looking …",
+  "doctor.PASS": "All is well.",
+  "doctor.WARN": "It will work, but look at the warnings.",
+  "doctor.FAIL": "Something must be put right first.",
+  "doctor.mark_PASS": "PASS",
+  "doctor.mark_WARN": "WARN",
+  "doctor.mark_FAIL": "FAIL",
+  "doctor.software": "software",
+  "doctor.memory": "memory",
+  "doctor.disk": "disk",
+  "doctor.network": "network",
+  "doctor.cameras": "cameras",
+  "doctor.time": "time",
+  "doctor.processor": "processor",
 };

@@ -1,8 +1,7 @@
 /** English words of measuring by hand. Every key stands in nb-digitize.js too (a test looks). */
-export const digitize = {
+export const words = {
   "digitize.title": "Measuring by hand",
   "digitize.title_of": "Measuring {recording} by hand",
-  "digitize.link": "Measure by hand",
   "digitize.opening": "Opening the recording …",
   "digitize.cut": "No connection to the service: what is done now is not kept",
   "digitize.loading": "Fetching the picture …",

@@ -1,5 +1,5 @@
 /** English words of the last jump, the coach's screen and the athlete's page. Every key stands in nb-jump.js too (a test looks). */
-export const jump = {
+export const words = {
   "jump.unnamed": "name unknown",
   "jump.not_measured": "Not measured",
   "jump.waiting": "Waits to be measured",
@@ -21,7 +21,6 @@ export const jump = {
   "replay.play": "Play",
   "replay.pause": "Stop",
 
-  "coach.title": "Coach's screen",
   "coach.nothing": "No jump yet",
   "coach.delayed": "{seconds} s ago",
   "coach.now": "Now",

@@ -1,5 +1,5 @@
 /** English words of the log. Every key stands in nb-log.js too (a test looks). */
-export const log = {
+export const words = {
   "log.show": "Show",
   "log.all": "everything",
   "log.info": "what happens",

@@ -1,5 +1,5 @@
 /** English words of what was measured. Every key stands in nb-measuring.js too (a test looks). */
-export const measuring = {
+export const words = {
   "measured.title": "Last jump, figures",
   "measured.ok": "Measured well",
   "measured.doubtful": "Doubtful",

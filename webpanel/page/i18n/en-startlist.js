@@ -1,5 +1,5 @@
 /** English words of loading a start list. Every key stands in nb-startlist.js too (a test looks). */
-export const startList = {
+export const words = {
   "list.load": "Load a list",
   "list.loaded": "The start list has {jumpers} jumpers.",
   "list.refused": "The list was not loaded. {why}",
@@ -14,7 +14,4 @@ export const startList = {
   "list.which_letters": "Its letters can be read in several ways. Which names are right?",
   "list.replace": "Replace",
   "list.empty": "Empty the list",
-  "field.club": "Club",
-  "field.first": "First name",
-  "field.last": "Last name",
 };

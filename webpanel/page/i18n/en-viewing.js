@@ -1,5 +1,5 @@
 /** English words of what was measured, over the pictures and beside them. Every key stands in nb-viewing.js too (a test looks). */
-export const viewing = {
+export const words = {
   "jump.number": "Jump {jump}",
   "jump.which": "Jump of this recording",
   "jump.stick": "Stick figure",
@@ -20,4 +20,16 @@ export const viewing = {
   "curves.dphi": "Right ski minus left, Δφ",
   "curves.phi": "Slope of the skis, φ",
   "curves.angle_of_attack": "Angle of attack",
+
+  "compare.view": "How two jumps are shown",
+  "compare.beside": "Side by side",
+  "compare.ghost": "Ghost",
+  "compare.page": "What differs",
+  "compare.by_takeoff": "Aligned at the measured take-off of both.",
+  "compare.by_motion": "Aligned where most moves in each: the take-off was not measured of both.",
+  "compare.by_beginning": "Both from their beginning: nothing moves in one of them.",
+  "compare.no_ghost": "No ghost: they have not the same cameras.",
+  "compare.with": "Compare with",
+  "compare.none": "no other jump",
+  "compare.where": "{pulse}  ·  {since} s after that moment",
 };

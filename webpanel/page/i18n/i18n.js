@@ -1,50 +1,81 @@
 /** Translates the page. What the service says comes in English with a code, by which it is translated here. */
 
+import { bring } from "../shared/loading.js";
 import { load, save } from "../shared/store.js";
-import { en } from "./en.js";
-import { analysis as nbAnalysis } from "./nb-analysis.js";
-import { digitizing as nbDigitizing } from "./nb-digitizing.js";
-import { events as nbEvents } from "./nb-events.js";
-import { files as nbFiles } from "./nb-files.js";
-import { findings as nbFindings } from "./nb-findings.js";
-import { refusals as nbRefusals } from "./nb-refusals.js";
-import { statements as nbStatements } from "./nb-statements.js";
-import { targets as nbTargets } from "./nb-targets.js";
-import { nb } from "./nb.js";
 
 /** @typedef {import("../shared/types.js").Statement} Statement */
 /** @typedef {import("../shared/types.js").Values} Values */
 
-const LANGUAGES = { en, nb };
-/** @type {Record<string, Record<string, [string, string?]>>} text and advice by code */
-const STATEMENTS = { en: {}, nb: { ...nbStatements, ...nbFindings, ...nbEvents, ...nbAnalysis, ...nbRefusals, ...nbDigitizing, ...nbTargets, ...nbFiles } };
+/** Words by language, as far as they were needed. @type {Record<string, Record<string, string>>} */
+const WORDS = { en: {}, nb: {} };
+/** Text and advice by code: what the service says is in English. @type {Record<string, Record<string, [string, string?]>>} */
+const STATEMENTS = { en: {}, nb: {} };
+/** What of a language is there: sets of words, and the statements ("said"). @type {Record<string, Set<string>>} */
+const there = { en: new Set(["said"]), nb: new Set() };
+/** The sets of words that the page has needed in any language; "": those of what is around the views. */
+const needed = new Set(["", "said"]);
 
 /** @type {"en"|"nb"} */
 let language = "en";
 
-/** The language chosen last, else the browser's; Norwegian of any kind reads bokmål. */
-export function startLanguage() {
+/**
+ * The language chosen last, else the browser's; Norwegian of any kind reads bokmål.
+ *
+ * @param {...string} sets of words beside those of what is around the views: NAME of en-NAME.js
+ */
+export async function startLanguage(...sets) {
   const browsers = /^(nb|nn|no)\b/i.test(navigator.language) ? "nb" : "en";
-  setLanguage(load("language", browsers));
+  language = load("language", browsers) === "nb" ? "nb" : "en";
+  await needWords(...sets);
 }
 
-/** @param {string} name */
-function setLanguage(name) {
-  language = name === "nb" ? "nb" : "en";
+/**
+ * Load sets of words in the language in use, and put them into the page.
+ *
+ * @param {...string} sets
+ * @throws {import("../shared/api.js").Problem} they do not come
+ */
+export async function needWords(...sets) {
+  for (const name of sets) needed.add(name);
+  await loadWords(language);
+  translate();
+}
+
+/**
+ * @param {string} name of a language
+ * @throws {import("../shared/api.js").Problem} its words do not come
+ */
+export async function chooseLanguage(name) {
+  const chosen = name === "nb" ? "nb" : "en";
+  await loadWords(chosen);
+  save("language", chosen);
+  language = chosen;
+  translate();
+}
+
+/** @param {"en"|"nb"} name */
+async function loadWords(name) {
+  await Promise.all([...needed].filter((set) => !there[name].has(set)).map(async (set) => {
+    const { words = {}, said = {} } = await bring(() => import(`./${set ? `${name}-${set}` : name}.js`));
+    Object.assign(WORDS[name], words);
+    Object.assign(STATEMENTS[name], said);
+    there[name].add(set);
+  }));
+}
+
+/** Write the words that are there into the page. */
+function translate() {
   document.documentElement.lang = language;
   for (const [attribute, put] of /** @type {[string, (e: Element, words: string) => void][]} */ ([
     ["data-t", (element, words) => { element.textContent = words; }],
     ["data-t-label", (element, words) => { element.setAttribute("aria-label", words); if (element.matches("button, a")) element.setAttribute("title", words); }],
     ["data-t-placeholder", (element, words) => element.setAttribute("placeholder", words)],
   ])) {
-    for (const element of document.querySelectorAll(`[${attribute}]`)) put(element, t(element.getAttribute(attribute) ?? ""));
+    for (const element of document.querySelectorAll(`[${attribute}]`)) {
+      const key = element.getAttribute(attribute) ?? "";
+      if (Object.hasOwn(WORDS[language], key)) put(element, t(key)); // of a part that was not shown yet there are none
+    }
   }
-}
-
-/** @param {string} name */
-export function chooseLanguage(name) {
-  save("language", name);
-  setLanguage(name);
 }
 
 /** The language in use: "en" or "nb". */
@@ -59,8 +90,8 @@ export function languageInUse() {
  * @param {Values} [values]
  */
 export function t(key, values = {}) {
-  const words = /** @type {Record<string, string>} */ (LANGUAGES[language])[key];
-  if (words === undefined) throw new Error(`i18n/${language}.js has no "${key}"`);
+  const words = WORDS[language][key];
+  if (words === undefined) throw new Error(`no words for "${key}" are loaded in ${language}`);
   return fill(words, values);
 }
 

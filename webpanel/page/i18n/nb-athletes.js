@@ -1,6 +1,5 @@
 /** Norske ord om utøvere og økter. De samme nøklene som i en-athletes.js. */
-export const athletes = {
-  "athletes.session": "Dagens tabell",
+export const words = {
   "athletes.day": "Dag",
   "athletes.everybody": "Alle",
   "athletes.csv": "Tabell til Excel (CSV)",
@@ -23,16 +22,6 @@ export const athletes = {
   "athletes.never": "Aldri målt.",
   "athletes.chart": "{title}: middel av {count} godt målte hopp {mean} {unit}",
   "athletes.legend": "Prikker: hopp med standardavvik; de hule er usikre eller bare målt direkte. Strek og bånd: dagens middel, og hvordan de godt målte hoppene sprer seg.",
-  "athletes.of": "Alle hopp av {athlete}",
-
-  "compare.view": "Hvordan to hopp vises",
-  "compare.beside": "Side om side",
-  "compare.ghost": "Skygge",
-  "compare.page": "Hva er ulikt",
-  "compare.by_takeoff": "Stilt etter målt sats i begge.",
-  "compare.by_motion": "Stilt der det er mest bevegelse i hvert: satsen er ikke målt i begge.",
-  "compare.by_beginning": "Begge fra begynnelsen: i ett av dem beveger ingenting seg.",
-  "compare.no_ghost": "Ingen skygge: de har ikke de samme kameraene.",
 
   "spans.title": "Mer enn tilfeldig?",
   "spans.lead": "Sammenligner alle godt målte hopp fra to dager eller perioder, med samme test som to hopp sammenlignes med: den største av mange forskjeller må være større enn tilfeldigheter gjør den.",

@@ -1,5 +1,5 @@
 /** Norske ord for kalibreringshjelpen. De samme nøklene som i en-calibrating.js. */
-export const calibrating = {
+export const words = {
   "calibrating.title": "Kalibrer med et trykt mål",
   "calibrating.hint": "Skriv ut et brett med svev target. Beveg det langsomt foran kameraet, og hold det i ro nå og da: et bilde beholdes av seg selv. Alle kameraer som ser det, teller.",
   "calibrating.printed": "Hva som ble skrevet ut",

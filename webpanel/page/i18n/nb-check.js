@@ -1,5 +1,5 @@
 /** Norwegian words of the views that check and set up the rig. */
-export const check = {
+export const words = {
   "rehearsal.title": "Generalprøve",
   "rehearsal.lead": "Tar opp i fem sekunder med alt som et hopp trenger, leser det tilbake, sier om det holder, og sletter det. Kameraene må være av.",
   "rehearsal.run": "Kjør prøven",
@@ -22,7 +22,6 @@ export const check = {
   "rehearsal.pulses": "Pulser, fullstendige",
   "rehearsal.everything": "Alt som ble undersøkt",
 
-  "aim.open": "Fokus",
   "aim.title": "Fokus",
   "aim.back": "Tilbake til direktevisningen",
   "aim.when_armed": "Gjør riggen klar: da kommer bildene.",
@@ -103,4 +102,23 @@ export const check = {
   "pulses.kept": "Takten er lagret i riggfilen.",
   "aim.not_there": "{camera} har ikke noe bilde i det opptaket.",
   "aim.other_size": "Det bildet har en annen størrelse: kameraets utsnitt er endret siden.",
+
+  "doctor.title": "Sjekk riggen",
+  "doctor.lead": "Ser på alt et opptak er avhengig av: kameraer, nettverk, disk, datamaskin. Tar noen sekunder.",
+  "doctor.run": "Sjekk nå",
+  "doctor.again": "Sjekk igjen",
+  "doctor.looking": "Ser etter …",
+  "doctor.PASS": "Alt er i orden.",
+  "doctor.WARN": "Det vil virke, men se på advarslene.",
+  "doctor.FAIL": "Noe må ordnes først.",
+  "doctor.mark_PASS": "OK",
+  "doctor.mark_WARN": "ADVARSEL",
+  "doctor.mark_FAIL": "FEIL",
+  "doctor.software": "programvare",
+  "doctor.memory": "minne",
+  "doctor.disk": "disk",
+  "doctor.network": "nettverk",
+  "doctor.cameras": "kameraer",
+  "doctor.time": "klokke",
+  "doctor.processor": "prosessor",
 };

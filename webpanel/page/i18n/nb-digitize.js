@@ -1,8 +1,7 @@
 /** Norske ord om å måle for hånd. De samme nøklene som i en-digitize.js. */
-export const digitize = {
+export const words = {
   "digitize.title": "Måle for hånd",
   "digitize.title_of": "Måle {recording} for hånd",
-  "digitize.link": "Mål for hånd",
   "digitize.opening": "Åpner opptaket …",
   "digitize.cut": "Ingen forbindelse med tjenesten: det som gjøres nå, blir ikke tatt vare på",
   "digitize.loading": "Henter bildet …",

@@ -1,5 +1,5 @@
 /** Norske ord om det siste hoppet, trenerens skjerm og hopperens side. De samme nøklene som i en-jump.js. */
-export const jump = {
+export const words = {
   "jump.unnamed": "ukjent navn",
   "jump.not_measured": "Ikke målt",
   "jump.waiting": "Venter på å bli målt",
@@ -21,7 +21,6 @@ export const jump = {
   "replay.play": "Spill av",
   "replay.pause": "Stopp",
 
-  "coach.title": "Trenerens skjerm",
   "coach.nothing": "Ingen hopp ennå",
   "coach.delayed": "For {seconds} s siden",
   "coach.now": "Nå",

@@ -1,5 +1,5 @@
 /** Loggens ord på bokmål. De samme nøklene som i en-log.js. */
-export const log = {
+export const words = {
   "log.show": "Vis",
   "log.all": "alt",
   "log.info": "det som skjer",

@@ -1,5 +1,5 @@
 /** Norske ord om det som ble målt. De samme nøklene som i en-measuring.js. */
-export const measuring = {
+export const words = {
   "measured.title": "Siste hopp, tall",
   "measured.ok": "Godt målt",
   "measured.doubtful": "Usikkert",

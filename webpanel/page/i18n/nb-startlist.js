@@ -1,5 +1,5 @@
 /** Norske ord om å lese inn en startliste. De samme nøklene som i en-startlist.js. */
-export const startList = {
+export const words = {
   "list.load": "Les inn en liste",
   "list.loaded": "Startlisten har {jumpers} hoppere.",
   "list.refused": "Listen ble ikke lest inn. {why}",
@@ -14,7 +14,4 @@ export const startList = {
   "list.which_letters": "Bokstavene kan leses på flere måter. Hvilke navn er riktige?",
   "list.replace": "Erstatt",
   "list.empty": "Tøm listen",
-  "field.club": "Klubb",
-  "field.first": "Fornavn",
-  "field.last": "Etternavn",
 };

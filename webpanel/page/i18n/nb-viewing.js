@@ -1,5 +1,5 @@
 /** Norwegian words of what was measured, over the pictures and beside them. */
-export const viewing = {
+export const words = {
   "jump.number": "Hopp {jump}",
   "jump.which": "Hopp i dette opptaket",
   "jump.stick": "Strekfigur",
@@ -20,4 +20,16 @@ export const viewing = {
   "curves.dphi": "Høyre ski minus venstre, Δφ",
   "curves.phi": "Skienes helning, φ",
   "curves.angle_of_attack": "Angrepsvinkel",
+
+  "compare.view": "Hvordan to hopp vises",
+  "compare.beside": "Side om side",
+  "compare.ghost": "Skygge",
+  "compare.page": "Hva er ulikt",
+  "compare.by_takeoff": "Stilt etter målt sats i begge.",
+  "compare.by_motion": "Stilt der det er mest bevegelse i hvert: satsen er ikke målt i begge.",
+  "compare.by_beginning": "Begge fra begynnelsen: i ett av dem beveger ingenting seg.",
+  "compare.no_ghost": "Ingen skygge: de har ikke de samme kameraene.",
+  "compare.with": "Sammenlign med",
+  "compare.none": "ikke noe annet hopp",
+  "compare.where": "{pulse}  ·  {since} s etter det øyeblikket",
 };

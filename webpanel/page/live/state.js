@@ -1,11 +1,10 @@
-/** The state of the rig as colour, word and icon: large in the live view, small at the top where that is not in sight. */
+/** The state of the rig as colour, word and icon: large in the live view. Where that is not in sight, frame/pill.js shows it. */
 
 import { say, t } from "../i18n/i18n.js";
 import { $, setIcon, setText } from "../shared/dom.js";
 import { clock, timeOfDay, who } from "../shared/format.js";
+import { recordedFor, STATE_ICONS } from "../shared/state.js";
 import { known, watch } from "../shared/store.js";
-
-const ICONS = { idle: "idle", arming: "arming", armed: "armed", recording: "recording", disarming: "arming", fault: "fault", unknown: "arming" };
 
 export function startState() {
   watch(draw);
@@ -15,15 +14,11 @@ export function startState() {
 }
 
 function draw() {
-  const { status, connected } = known;
+  const { status } = known;
   const state = status?.state ?? "unknown";
-  document.body.classList.toggle("stale", !connected);
-  document.title = `${t(`state.${state}`)} – Svev`;
-  for (const element of [$("state"), $("pill")]) {
-    element.dataset.state = state;
-    element.dataset.level = status?.statement.level ?? "";
-    setIcon(element.querySelector("svg"), ICONS[state]);
-  }
+  $("state").dataset.state = state;
+  $("state").dataset.level = status?.statement.level ?? "";
+  setIcon($("state").querySelector("svg"), STATE_ICONS[state]);
   setText($("state-word"), t(`state.${state}`));
   setText($("state-text"), inWords());
   $("state-text").dataset.level = status?.statement.level ?? "";
@@ -64,18 +59,6 @@ function asSentence(words) {
 
 function drawTime() {
   const { status, connected, heard } = known;
-  const word = t(`state.${status?.state ?? "unknown"}`);
-  setText($("state-time"), timeShown());
-  const seconds = connected && status?.recording ? ` ${clock(recordedFor())}` : "";
-  setText($("pill").querySelector("span"), word + seconds);
-  if (!connected && heard) setText($("state-time"), t("lost.as_of", { time: timeOfDay(heard) }));
-}
-
-function timeShown() {
-  return known.status?.recording ? clock(recordedFor()) : "";
-}
-
-/** Seconds recorded, counted on between two statuses so that the clock runs evenly. */
-function recordedFor() {
-  return (known.status?.recording?.duration_s ?? 0) + Math.min(2, (Date.now() - known.heard) / 1000);
+  const recorded = status?.recording ? clock(recordedFor()) : "";
+  setText($("state-time"), !connected && heard ? t("lost.as_of", { time: timeOfDay(heard) }) : recorded);
 }

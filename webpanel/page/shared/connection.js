@@ -18,8 +18,13 @@ const SILENCE_MS = 20_000;
 /** @typedef {import("./hub.js").News} News */
 /** @typedef {{ opened: () => void, log: (event: Event) => void, recordings: () => void, picture: (image: Blob, shown: () => void) => void, noPicture: (why: import("./hub.js").Why|null) => void }} Hearer */
 
+/** So many lines of the log are kept for parts of the page that come later. */
+const LINES_KEPT = 1_000;
+
 /** @type {Hearer[]} */
 const hearers = [];
+/** The log since it was opened, oldest first. @type {Event[]} */
+let lines = [];
 /** @type {MessagePort|null} */
 let port = null;
 let watchdog = 0;
@@ -29,12 +34,14 @@ const viewers = new Set();
 let workerWorks = typeof SharedWorker !== "undefined";
 
 /**
- * Listen to what comes beside the status.
+ * Listen to what comes beside the status. What the log has said already is heard at once.
  *
  * @param {Partial<Hearer>} hearer `opened`: the log comes from its beginning again; `picture`: call `shown` for the next one.
  */
 export function hear(hearer) {
-  hearers.push({ opened: () => {}, log: () => {}, recordings: () => {}, picture: (_, shown) => shown(), noPicture: () => {}, ...hearer });
+  const whole = { opened: () => {}, log: () => {}, recordings: () => {}, picture: (/** @type {Blob} */ _, /** @type {() => void} */ shown) => shown(), noPicture: () => {}, ...hearer };
+  hearers.push(whole);
+  lines.forEach(whole.log);
 }
 
 /** Begin to listen to the service. */
@@ -121,6 +128,7 @@ function heard(news) {
   if (news.type === "lost") update({ connected: false, retryAt: news.retryAt, slow: null });
   if (news.type === "login") needToken();
   if (news.type === "log") {
+    lines = [...(news.fresh ? [] : lines), ...news.events].slice(-LINES_KEPT);
     if (news.fresh) hearers.forEach((hearer) => hearer.opened());
     for (const event of news.events) hearers.forEach((hearer) => hearer.log(event));
   }

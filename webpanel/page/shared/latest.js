@@ -23,7 +23,12 @@ let asked = "";
 /** Number of the question that was asked last: the answers to those before it are old. */
 let questions = 0;
 
+let started = false;
+
+/** Keep it up to date from now on. */
 export function startLatest() {
+  if (started) return; // another part of the page needs it too
+  started = true;
   hear({ recordings: () => void load(true) });
   watch(() => void load(false));
 }

@@ -29,7 +29,7 @@ export function place() {
 let follow = () => {};
 
 /**
- * Go to a view. It is shown when this returns: the key that is pressed next acts on it.
+ * Go to a view. If it is loaded, it is shown when this returns: the key that is pressed next acts on it.
  *
  * @param {string} path e.g. "recordings"
  */
@@ -39,18 +39,22 @@ export function go(path) {
 }
 
 /**
- * Show the view of the address, now and whenever it changes.
+ * Show the view of the address, now and whenever it changes. One that is not loaded yet is shown when it is.
  *
+ * @param {(view: string) => boolean} loaded
+ * @param {(view: string) => Promise<boolean>} load loads what is behind a view, and says whether it is there
  * @param {(place: Place) => void} entered
  * @param {() => void} leaving called while the view before is still shown and scrolled as it was
  */
-export function startRouter(entered, leaving) {
+export function startRouter(loaded, load, entered, leaving) {
   history.scrollRestoration = "manual"; // a view that keeps its place scrolls by itself
   let address = "";
   const show = () => {
     address = location.hash;
     const now = place();
-    for (const name of VIEWS) $(name).hidden = name !== now.view;
+    const there = loaded(now.view);
+    for (const name of VIEWS) $(name).hidden = !there || name !== now.view;
+    $("loading").hidden = there;
     document.body.dataset.view = now.view;
     const tab = UNDER[now.view] ?? now.view;
     for (const link of document.querySelectorAll(".nav a")) {
@@ -59,7 +63,11 @@ export function startRouter(entered, leaving) {
     }
     scrollTo(0, 0);
     update({ view: now.view });
-    entered(now);
+    if (there) entered(now);
+    else void arrive(now.view);
+  };
+  const arrive = async (/** @type {string} */ view) => {
+    if (await load(view) && place().view === view && !$("loading").hidden) show();
   };
   follow = () => {
     if (location.hash === address) return; // the event comes after go() has shown the view

@@ -1,0 +1,21 @@
+/** Checks of the rig: doctor, pulses of our own, regions, rehearsal. */
+
+import * as doctor from "../system/doctor.js";
+import { drawPulses, enterPulses, startPulses } from "../system/pulses.js";
+import { drawRegion, enterRegion, startRegion } from "../system/region.js";
+import * as rehearsal from "../system/rehearsal.js";
+
+export function start() {
+  for (const begin of [doctor.startDoctor, rehearsal.startRehearsal, startPulses, startRegion]) begin();
+}
+
+export function draw() {
+  for (const again of [doctor.draw, rehearsal.draw, drawPulses, drawRegion]) again();
+}
+
+export function enter() {
+  doctor.draw();
+  rehearsal.enterRehearsal();
+  void enterPulses();
+  void enterRegion();
+}

@@ -378,7 +378,7 @@ PATHS: dict[str, tuple[str, Callable[[Any], Path]]] = {
 
 
 def test_every_path_says_where_it_begins_and_begins_there(tmp_path: Path) -> None:
-    """The rule of `docs/rig-file.md`: what describes the rig is relative to its file, where recordings go is not."""
+    """As the page of the rig file has it: what describes the rig is relative to its file, where recordings go not."""
     schema = json.loads(rig_schema())
     tables = {"": schema, **{f"{name}.": table for name, table in schema["$defs"].items()}}
     said = {

@@ -53,7 +53,7 @@ def find_jumps(
         for move in steadiness.moved
     }
     loose = [_loosened(seen, moves_px) for seen in candidates]
-    found: list[JumpMeasurements] = []
+    found: list[tuple[PulseMeasurements, ...]] = []
     sightings = find_sightings(loose, system, facts.rate_hz, exposures)
     check_up(system, [sighting.flight for sighting in sightings])
     for sighting in sightings:
@@ -65,15 +65,37 @@ def find_jumps(
         standing = steadiness.during([seen.pulse for seen in window])
         if not moves_px and _stood_still(standing, system):
             if measured := sighting.measured(look):
-                found.append(JumpMeasurements(len(found) + 1, without_gaps(measured)))
+                found.append(measured)
             continue
         steady = standing.candidates(window)
         again = identify(steady, standing.system, facts.rate_hz, exposures, standing.look(look))
         best = max(again, key=lambda one: len(one.pulses), default=None)
         if best is not None:
-            steadied = tuple(standing.in_frames(pulse) for pulse in best.pulses)
-            found.append(JumpMeasurements(len(found) + 1, without_gaps(steadied)))
-    return found
+            found.append(tuple(standing.in_frames(pulse) for pulse in best.pulses))
+    jumps = [without_gaps(pulses) for pulses in one_of_each(found)]
+    return [JumpMeasurements(number, pulses) for number, pulses in enumerate(jumps, start=1)]
+
+
+def one_of_each(found: Sequence[Sequence[PulseMeasurements]]) -> list[list[PulseMeasurements]]:
+    """Jumpers as they were found, each once, in the order of time.
+
+    No two jumpers are in sight at once. Where one is hidden for a while, two parts of his path are sighted, and he is
+    followed beyond the ends of both: what shares pulses is one jumper. Of a shared pulse the richer measurements count.
+    """
+    jumps: list[dict[PulseNumber, PulseMeasurements]] = []
+    for pulses in sorted(found, key=lambda each: each[0].pulse):
+        if not jumps or pulses[0].pulse > max(jumps[-1]):
+            jumps.append({})
+        for each in pulses:
+            known = jumps[-1].get(each.pulse)
+            if known is None or _richness(each) > _richness(known):
+                jumps[-1][each.pulse] = each
+    return [[jump[number] for number in sorted(jump)] for jump in jumps]
+
+
+def _richness(pulse: PulseMeasurements) -> int:
+    """How much was measured in the images of a pulse."""
+    return sum(len(image.points) + len(image.skis) for image in pulse.images.values())
 
 
 def without_gaps(pulses: Sequence[PulseMeasurements]) -> tuple[PulseMeasurements, ...]:

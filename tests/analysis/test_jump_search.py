@@ -1,9 +1,11 @@
-"""A damaged log: the jump goes on over the pulses that cannot be read."""
+"""Jumps as they were found: a damaged log, and a jumper whose path was sighted in two parts."""
+
+import numpy as np
 
 from analysis.candidates.model import PulseCandidates
-from analysis.measurements.model import PulseMeasurements
+from analysis.measurements.model import ImageMeasurements, PointMeasurement, PulseMeasurements
 from analysis.procedure.analyze import unread_pulses
-from analysis.procedure.jump_search import without_gaps
+from analysis.procedure.jump_search import one_of_each, without_gaps
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
 
@@ -25,3 +27,24 @@ def test_pulses_that_cannot_be_read_are_said() -> None:
     assert line == "pulse 8 cannot be read from the log: it is damaged; svev verify says more"
     (line,) = unread_pulses(seen(7, 20))
     assert line.startswith("pulses 8, 9, 10, 11, 12, 13, ... cannot be read")
+
+
+def _measured(pulse: int, *points: str) -> PulseMeasurements:
+    known = {name: PointMeasurement(np.zeros(2), np.eye(2)) for name in points}
+    return PulseMeasurements(PulseNumber(pulse), UtcNs(pulse), {"K1": ImageMeasurements(known, {})})
+
+
+def test_parts_of_a_path_that_share_pulses_are_one_jump() -> None:
+    early = [_measured(n, "P1") for n in range(10, 30)]
+    late = [_measured(n, "P1", "P2") for n in range(25, 40)]
+    other = [_measured(n, "P1") for n in range(130, 150)]
+    first, second = one_of_each([late, other, early])
+    assert [pulse.pulse for pulse in first] == list(range(10, 40))
+    assert [len(pulse.images["K1"].points) for pulse in first] == [1] * 15 + [2] * 15
+    assert second == other
+
+
+def test_jumps_one_after_the_other_stay_two() -> None:
+    one, two = [_measured(n, "P1") for n in range(10, 30)], [_measured(n, "P1") for n in range(30, 50)]
+    assert one_of_each([one, two]) == [one, two]
+    assert one_of_each([]) == []

@@ -34,7 +34,8 @@ class Scenery:
     def __init__(self, scenario: Scenario, cameras: list[Projection], path: Floats, rng: np.random.Generator) -> None:
         self._scenario, self._cameras, self._rng = scenario, cameras, rng
         self._balls = [ball for ball in scenario.balls if not ball.gone]
-        self._lines = _lines(cameras, np.array([*[ball.X for ball in self._balls], *path]))
+        sought = [*[np.array(ball.X) for ball in self._balls], *path]
+        self._lines = [(camera.X0, place) for camera in cameras for place in sought]
 
     def snow(self, x: Floats, y: Floats) -> Floats:
         """Height of the snow, m: that of the hill, dug away where it would hide the scene from a camera."""
@@ -114,9 +115,7 @@ class Scenery:
                 shield[:3] = np.stack((np.cross((0, 0, 1), away), (0, 0, 1), away, place), axis=1)
                 shields.append(shield)
             if ball.covered:
-                mound = np.eye(4)
-                mound[:3, 3] = place + radius * (2 * ball.covered - 1) * np.array((0.0, 0.0, 1.0))
-                mounds.append(mound)
+                mounds.append(_at(place + radius * (2 * ball.covered - 1) * np.array((0.0, 0.0, 1.0))))
         wide, high = (of * radius for of in _SHIELD)
         return {
             "ball": (ellipsoid(radius, radius, radius, rings=33), ("ball",), [_at(place) for place in where]),
@@ -126,12 +125,8 @@ class Scenery:
         }
 
 
-def _lines(cameras: list[Projection], places: Floats) -> list[tuple[Floats, Floats]]:
-    """The lines of sight from the cameras to the places."""
-    return [(camera.X0, place) for camera in cameras for place in places]
-
-
 def _at(place: Floats) -> Floats:
+    """The matrix (4, 4) that puts a thing there."""
     matrix = np.eye(4)
     matrix[:3, 3] = place
     return matrix

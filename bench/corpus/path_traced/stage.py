@@ -6,7 +6,7 @@ the picture without the jumper.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -16,12 +16,14 @@ from bench.corpus.path_traced.optics import FINER, Optics
 from bench.corpus.path_traced.scenery import Scenery
 from rig.arrays import Floats
 from simrig.world.jumper import Jump, JumpSeries
+from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, Scenario
 
-#: Radiance of a white surface in full light, of what a picture can hold: what is brighter still is told apart.
+#: Radiance of a white surface in full light, of what a picture holds: the sensor alone clips what is brighter.
 WHITE: Final = 0.4
 STILL: Final = "still"  # picture of a camera without the jumper
-_SAMPLES, _STILL_SAMPLES, _BOUNCES = 8, 6, 1
+_SAMPLES, _STILL_SAMPLES = 6, 4  # of a pixel of the picture: 24 and 16 of one of the image
+_BOUNCES: Final = 1
 _AROUND_M: Final = 0.35  # rendered about the joints
 _ALBEDO: Final = 0.85  # of white
 _OVERCAST: Final = 0.9  # radiance of the sky without a sun
@@ -204,9 +206,8 @@ class Stage:
         return {name: dict(zip(keys, of, strict=True)) for name, of in known.items()}
 
 
-def _towards(cameras: Any, place: Floats) -> Floats:
+def _towards(cameras: Collection[Projection], place: Floats) -> Floats:
     """Mean direction to the cameras on that side of the hill where most of them are, unit, shape (3,)."""
-    cameras = list(cameras)
     side = 1.0 if sum(np.sign(camera.X0[1]) for camera in cameras) > 0 else -1.0
     ways = [camera.X0 - place for camera in cameras if np.sign(camera.X0[1]) == side]
     mean = np.mean([way / np.linalg.norm(way) for way in ways], axis=0)

@@ -1,5 +1,6 @@
 """What stands still in the path-traced pictures: snow, take-off table, forest, balls on posts."""
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -13,6 +14,7 @@ _STEP_M: Final = 1.5
 _TABLE_END_M: Final = -45.0
 _BELOW_M: Final = 0.3  # of a line of sight; the snow must not be nearer
 _SLOPE: Final = 0.5  # of the snow beside a line of sight
+_POST_M: Final = 0.015
 _TREES: Final = 500
 _FOREST_M: Final = (22.0, 70.0)  # beside the hill
 _SHIELDED: Final = 0.85  # share of the balls with a dark shield behind them
@@ -102,9 +104,8 @@ class Scenery:
         radius = self._scenario.ball_radius_m
         where = np.array([ball.X for ball in self._balls])
         shields, mounds, posts = [], [], []
-        eye = np.mean([camera.X0 for camera in self._cameras], axis=0)
         for ball, place in zip(self._balls, where, strict=True):
-            away = (place - eye) * (1, 1, 0)
+            away = -towards(self._cameras, place) * (1, 1, 0)
             away /= np.linalg.norm(away)
             foot = float(self.snow(place[0], place[1])) - 0.5
             post = np.diag((1.0, 1.0, place[2] - foot, 1.0))
@@ -119,10 +120,18 @@ class Scenery:
         wide, high = (of * radius for of in _SHIELD)
         return {
             "ball": (ellipsoid(radius, radius, radius, rings=33), ("ball",), [_at(place) for place in where]),
-            "post": (loft([(0, 0.03, 0.03), (1, 0.03, 0.03)]), ("post",), posts),
+            "post": (loft([(0, _POST_M, _POST_M), (1, _POST_M, _POST_M)]), ("post",), posts),
             "shield": (arc(wide, high), ("shield",), shields),
             "mound": (_under(disc(1.6 * radius, 4 * radius), 2 * radius), ("snow",), mounds),
         }
+
+
+def towards(cameras: Sequence[Projection], place: Floats) -> Floats:
+    """Mean direction to the cameras on that side of the hill where most of them are, unit, shape (3,)."""
+    side = 1.0 if sum(np.sign(camera.X0[1]) for camera in cameras) > 0 else -1.0
+    ways = [camera.X0 - place for camera in cameras if np.sign(camera.X0[1]) == side]
+    mean = np.mean([way / np.linalg.norm(way) for way in ways], axis=0)
+    return np.asarray(mean / np.linalg.norm(mean))
 
 
 def _at(place: Floats) -> Floats:

@@ -6,17 +6,16 @@ the picture without the jumper.
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from bench.corpus.path_traced.figure import MARKER_THICK_M, Figure
 from bench.corpus.path_traced.optics import FINER, Optics
-from bench.corpus.path_traced.scenery import Scenery
+from bench.corpus.path_traced.scenery import Scenery, towards
 from rig.arrays import Floats
 from simrig.world.jumper import Jump, JumpSeries
-from simrig.world.projection import Projection
 from simrig.world.scenario import BRIGHTEST, Scenario
 
 #: Radiance of a white surface in full light, of what a picture holds: the sensor alone clips what is brighter.
@@ -67,8 +66,8 @@ class Stage:
         self._jump: Jump = JumpSeries(scenario).first()
         jumping = [state for state in states.values() if state["jumper_present"]]
         path = np.array([state["origin"] for state in jumping])
-        self._towards = _towards(self._cameras.values(), path.mean(axis=0))
-        self._figure = Figure(scenario.jumper, self._towards, float(self._rng.normal(0, _BEND_M)))
+        facing = towards(list(self._cameras.values()), path.mean(axis=0))
+        self._figure = Figure(scenario.jumper, facing, float(self._rng.normal(0, _BEND_M)))
         self.scenery = Scenery(scenario, list(self._cameras.values()), path, self._rng)
         self.told = self._description()
 
@@ -204,14 +203,6 @@ class Stage:
         }
         keys = "albedo", "contrast", "grain_m", "bump_m", "gloss", "roughness"
         return {name: dict(zip(keys, of, strict=True)) for name, of in known.items()}
-
-
-def _towards(cameras: Collection[Projection], place: Floats) -> Floats:
-    """Mean direction to the cameras on that side of the hill where most of them are, unit, shape (3,)."""
-    side = 1.0 if sum(np.sign(camera.X0[1]) for camera in cameras) > 0 else -1.0
-    ways = [camera.X0 - place for camera in cameras if np.sign(camera.X0[1]) == side]
-    mean = np.mean([way / np.linalg.norm(way) for way in ways], axis=0)
-    return np.asarray(mean / np.linalg.norm(mean))
 
 
 def _apart(rectangles: list[tuple[int, int, int, int]]) -> list[tuple[int, int, int, int]]:

@@ -12,9 +12,17 @@ from typing import Final
 
 from capture.clock_reading import ClockReading
 from capture.seam import Arrival, Camera, Commanded, Commands, OpenCamera
-from rig.clocks import NS_PER_S, ClockLatch, HostNs, host_now
+from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
-from rig.frame import NO_SLOT, Record, RecordKind
+from rig.frame import (
+    ConnectedRecord,
+    DisconnectedRecord,
+    FrameRecord,
+    LatchRecord,
+    LimitsRecord,
+    NoticeRecord,
+    Record,
+)
 from rig.transport.ring import CameraRing
 
 _LATCHES_AT_START: Final = 16
@@ -82,11 +90,11 @@ class Grabber:
         self._epoch += 1
         self._last_failure = ""
         asked = self._ring.reconnect_requests()
-        self._put(RecordKind.CONNECTED, text=camera.description)
+        self._queue(ConnectedRecord(host_now(), camera.description))
         if (limits := camera.limits) is not None:
-            self._put(RecordKind.LIMITS, text=limits.model_dump_json(exclude_defaults=True))
+            self._queue(LimitsRecord(host_now(), limits.model_dump_json(exclude_defaults=True)))
         for _ in range(_LATCHES_AT_START):
-            self._put_latch(camera.latch())
+            self._queue(LatchRecord(camera.latch()))
         camera.start()
         if self._commands is not None:
             self._commands.begin()
@@ -98,9 +106,12 @@ class Grabber:
             received = camera.bytes_received if wanted else 0
             arrival = self._receive(camera, self._last_look_s if wanted else _RECEIVE_S)
             for text in camera.notices():
-                self._put(RecordKind.NOTICE, text=text)
+                self._queue(NoticeRecord(host_now(), text))
             if arrival is not None:
-                self._put_arrival(arrival)
+                whole = isinstance(arrival, FrameRecord)
+                self._frames += whole
+                self._damaged += not whole
+                self._queue(arrival)
             elif wanted and camera.bytes_received == received and self._told:
                 # The recorder asked, then we looked once more and found nothing: the camera is silent, we are not late.
                 raise CameraError("no frame while the other cameras have theirs; connecting again")
@@ -114,9 +125,9 @@ class Grabber:
             last_arrival = now if arrival is not None else last_arrival
             if arrival is None and now < last_arrival + _QUIET_NS and not reading.wanted:
                 continue
-            taken = arrival.device_time if arrival is not None and arrival.whole else None
+            taken = arrival.device_time if isinstance(arrival, FrameRecord) else None
             if reading.is_due(now, taken):
-                self._put_latch(camera.latch())
+                self._queue(LatchRecord(camera.latch()))
                 reading.done(now)
             elif now >= next_count:
                 self._count(camera)
@@ -152,38 +163,17 @@ class Grabber:
                 f"{self._withheld} pulses had no command, which would have come too late: "
                 "this computer is too slow for them; lower trigger.rate_hz in the rig file, or close other programs"
             )
-            self._put(RecordKind.NOTICE, text=text)
+            self._queue(NoticeRecord(host_now(), text))
             self._withheld, self._tell_withheld_at = 0, HostNs(now + _TELL_WITHHELD_NS)
-
-    def _put_arrival(self, arrival: Arrival) -> None:
-        if not arrival.whole:
-            self._damaged += 1
-            time, known = arrival.device_time, int(arrival.device_time != 0)
-            self._queue(Record(RecordKind.DAMAGED, self._epoch, arrival.host_time, device_time=time, value=known))
-            return
-        self._frames += 1
-        stamped = 0 if arrival.stamped is None else arrival.stamped.to_value()
-        record = Record(
-            RecordKind.FRAME, self._epoch, arrival.host_time, arrival.slot, arrival.frame_id, arrival.id_modulus,
-            arrival.device_time, arrival.trigger_count, stamped,
-        )  # fmt: skip
-        self._queue(record)
-
-    def _put_latch(self, latch: ClockLatch) -> None:
-        time, device, round_trip = latch.host, latch.device, latch.round_trip_ns
-        self._queue(Record(RecordKind.LATCH, self._epoch, time, device_time=device, value=round_trip))
 
     def _report_failure(self, reason: str) -> None:
         """Report a failure once, not at every retry."""
         if reason != self._last_failure:
-            self._put(RecordKind.DISCONNECTED, text=reason)
+            self._queue(DisconnectedRecord(host_now(), reason))
         self._last_failure = reason
 
-    def _put(self, kind: RecordKind, *, text: str = "") -> None:
-        self._queue(Record(kind, self._epoch, host_now(), text=text))
-
     def _queue(self, record: Record) -> None:
-        if not self._ring.put(record) and record.slot != NO_SLOT:
+        if not self._ring.put(record, self._epoch) and isinstance(record, FrameRecord):
             self._ring.return_slot(record.slot)
         os.eventfd_write(self._doorbell, 1)
 

@@ -5,37 +5,14 @@ one `Arrival` per frame. One conformance suite (`tests/capture/test_conformance.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from rig.clocks import ClockLatch, DeviceNs, HostNs
-from rig.frame import NO_SLOT, StampedPixels
+from rig.clocks import ClockLatch, HostNs
+from rig.frame import DamagedRecord, FrameRecord
 from rig.settings.region import RegionLimits
 
-
-@dataclass(frozen=True, slots=True)
-class Arrival:
-    """A frame, whole or damaged, that came from a camera.
-
-    Attributes:
-        whole: the frame is whole. A damaged one has no pixels, and its ids mean nothing.
-        host_time: when the back end handed it over.
-        slot: slot of the ring that holds the pixels; the caller queues or returns it.
-        frame_id: block id (GigE Vision) or frame counter (IIDC).
-        id_modulus: how many different ids there are, 0 if they never wrap.
-        device_time: device clock at the trigger; for a damaged frame an estimate, or 0 if it is not known.
-        trigger_count: the camera's own count of triggers, -1 if it has none.
-        stamped: pixels that carry the camera's signature instead of the picture.
-    """
-
-    whole: bool
-    host_time: HostNs
-    slot: int = NO_SLOT
-    frame_id: int = 0
-    id_modulus: int = 0
-    device_time: DeviceNs = DeviceNs(0)
-    trigger_count: int = -1
-    stamped: StampedPixels | None = None
+#: A frame that came from a camera, as the grabber queues it; the caller queues or returns the slot of a whole one.
+Arrival = FrameRecord | DamagedRecord
 
 
 class Camera(Protocol):

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from capture.clock_reading import ClockReading
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
-from rig.frame import Record, RecordKind
+from rig.frame import FrameRecord
 from triggering.pairing.pairer import ClosedPulse, Pairer
 
 MS = 1_000_000
@@ -134,7 +134,7 @@ class Hill:
         self._cameras = [_Camera(number, case, self._rng, number * 10**15) for number in range(3)]
         period = round(NS_PER_S / case.rate_hz)
         self._pairer = Pairer(3, period, hold_ns=130 * MS + 4 * period)
-        self._arrivals: list[tuple[float, int, int, Record]] = []
+        self._arrivals: list[tuple[float, int, int, FrameRecord]] = []
         self._times: dict[int, float] = {}  # true time of the pulses that may still be decided
         self._decided: set[int] = set()
         self._suspensions: list[tuple[float, float]] = []
@@ -229,7 +229,7 @@ class Hill:
         camera.last_arrival = arrival
         device = DeviceNs(camera.device(time + rng.random() * case.jitter_ms * MS) + camera.slip + camera.spike)
         camera.spike = 0
-        record = Record(RecordKind.FRAME, 1, self._host(arrival), pulse, number, 65535, device)
+        record = FrameRecord(self._host(arrival), pulse, number, 65535, device, epoch=1)
         self._count += 1
         heapq.heappush(self._arrivals, (arrival, self._count, camera.number, record))
 

@@ -25,6 +25,7 @@ from capture.seam import Arrival
 from rig.action import ActionKeys
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError
+from rig.frame import DamagedRecord, FrameRecord
 from rig.settings.camera import CameraSettings
 from rig.settings.model import NetworkSettings
 from rig.settings.region import RegionLimits
@@ -167,12 +168,12 @@ class AravisCamera:
         time = self._time_of(buffer, now)
         if time is None or buffer.get_status() != Aravis.BufferStatus.SUCCESS:
             self._ring.return_slot(slot)
-            return Arrival(whole=False, host_time=now)
+            return DamagedRecord(now)
         self._frame_came = True
         frame_id = buffer.get_frame_id()
         if frame_id > _IDS_16_BIT:
             self._id_modulus = 0  # its ids are long, without a feature that says so
-        return Arrival(True, now, slot, frame_id, self._id_modulus, time)
+        return FrameRecord(now, slot, frame_id, self._id_modulus, time)
 
     def fire(self) -> None:
         """See `capture.seam.Commanded.fire`."""

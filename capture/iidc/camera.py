@@ -31,7 +31,7 @@ from capture.iidc.signature import ByteOrder, SignatureReader
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError, CameraNotFoundError, SvevError
-from rig.frame import StampedPixels
+from rig.frame import DamagedRecord, FrameRecord, StampedPixels
 from rig.settings.camera import CameraSettings
 from rig.settings.region import RegionLimits
 from rig.transport.ring import CameraRing
@@ -211,7 +211,7 @@ class IidcCamera:
             data = ctypes.string_at(image + self._stamp_at, self._signatures.line_bytes)
             signature = self._signatures.read(data, self._clock.at(first))
             if signature is None:
-                return Arrival(False, host_now(), device_time=device_time)
+                return DamagedRecord(host_now(), device_time)
             device_time, frames, triggers = DeviceNs(signature.trigger_ns), signature.frames, signature.triggers
             stamped = self._stamped_pixels
         slot = self._ring.take_slot()
@@ -219,7 +219,7 @@ class IidcCamera:
             self._underruns += 1
             return None
         self._copy(image, self._ring.frame(slot))
-        return Arrival(True, host_now(), slot, frames, 0, device_time, triggers, stamped)
+        return FrameRecord(host_now(), slot, frames, 0, device_time, triggers, stamped)
 
     def _after_bus_reset(self) -> None:
         """After somebody plugged a device, or a power dip: go on if the camera still has our settings.

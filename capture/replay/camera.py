@@ -14,7 +14,7 @@ from capture.replay.timeline import Timeline
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, ClockLatch, HostNs, host_now, sleep_until
 from rig.errors import CameraError, CameraNotFoundError
-from rig.frame import FrameStatus, StampedPixels
+from rig.frame import DamagedRecord, FrameRecord, FrameStatus, StampedPixels
 from rig.settings.camera import CameraSettings
 from rig.tag import CameraTag
 from rig.transport.ring import CameraRing
@@ -153,10 +153,10 @@ class ReplayCamera:
         if tag.stamped is not UNSET:
             row, column, count = tag.stamped
             stamped = StampedPixels(row, column - tag.columns[0], count)
-        return Arrival(
-            True, host_now(), slot, timeline.frame_id(pulse), timeline.id_modulus, timeline.frame_device_time(pulse),
+        return FrameRecord(
+            host_now(), slot, timeline.frame_id(pulse), timeline.id_modulus, timeline.frame_device_time(pulse),
             timeline.trigger_count(pulse), stamped,
         )  # fmt: skip
 
     def _damaged(self, pulse: int) -> Arrival:
-        return Arrival(False, host_now(), device_time=self._timeline.frame_device_time(pulse))
+        return DamagedRecord(host_now(), self._timeline.frame_device_time(pulse))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_now, sleep_until
 from rig.errors import CameraError
-from rig.frame import FrameStatus
+from rig.frame import DamagedRecord, FrameRecord, FrameStatus
 from rig.settings.camera import CameraSettings
 from rig.transport.ring import CameraRing
 
@@ -127,6 +127,6 @@ class SimCamera:
             return None
         sleep_until(ready)
         if slot is None:
-            return Arrival(whole=False, host_time=host_now())
+            return DamagedRecord(host_now())
         device = self._scene.device_time(time, pulse)
-        return Arrival(True, host_now(), slot, self._frame_id, 0, device, self._frame_id)
+        return FrameRecord(host_now(), slot, self._frame_id, 0, device, self._frame_id)

@@ -19,9 +19,19 @@ from msgspec import UNSET
 
 from recorder.live.unpacking import unpacker
 from recorder.log.triplet_buffers import TripletBuffers
-from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, HostNs, UtcAnchor, host_now
+from rig.clocks import NS_PER_S, NS_PER_US, HostNs, UtcAnchor, host_now
 from rig.doctor_call import with_rig_in_use
-from rig.frame import FrameStatus, Record, RecordKind, StampedPixels
+from rig.frame import (
+    ConnectedRecord,
+    DamagedRecord,
+    DisconnectedRecord,
+    FrameRecord,
+    FrameStatus,
+    LatchRecord,
+    LimitsRecord,
+    NoticeRecord,
+    Record,
+)
 from rig.images.pixels import Stored
 from rig.phrase import Phrase, phrase, plain
 from rig.settings.model import RigSettings
@@ -59,7 +69,7 @@ def in_flight_triplets(rig: RigSettings) -> int:
 
 
 #: Kinds of records that only a connected camera makes.
-_STREAMING: Final = (RecordKind.FRAME, RecordKind.DAMAGED, RecordKind.LATCH)
+_STREAMING: Final = (FrameRecord, DamagedRecord, LatchRecord)
 
 
 class _Composition:
@@ -77,7 +87,7 @@ class _Composition:
     def __init__(self, time: HostNs) -> None:
         self.time = time
         self.slot: int | None = None
-        self.pending: list[tuple[int, Record]] = []
+        self.pending: list[tuple[int, FrameRecord]] = []
         self.aside: Stored | None = None
 
 
@@ -247,7 +257,7 @@ class Assembler:
             triggers = None if record.trigger_count < 0 else record.trigger_count
             offset = None if outcome.offset_ns is None else outcome.offset_ns / NS_PER_US
             host = anchor.utc(record.host_time)
-            pixels = StampedPixels.from_value(record.value)
+            pixels = record.stamped
             stamped = UNSET if pixels is None else (pixels.row, columns[0] + pixels.column, pixels.count)
             yield CameraTag(
                 name, columns, outcome.status, record.frame_id, triggers, record.device_time, host, offset, stamped,
@@ -260,7 +270,7 @@ class Assembler:
         while not self._is_waiting(camera) and (record := ring.get()) is not None:
             if not self._heard[camera]:
                 self._hear_first(camera, record)
-            if record.kind is not RecordKind.FRAME:
+            if not isinstance(record, FrameRecord):
                 self._note(camera, record)
                 continue
             self._stranded[camera].discard(record.slot)
@@ -279,8 +289,8 @@ class Assembler:
 
     def _hear_first(self, camera: int, record: Record) -> None:
         """If the first record is of a streaming camera, this recorder has replaced one that crashed."""
-        self._heard[camera] = record.kind in (*_STREAMING, RecordKind.CONNECTED, RecordKind.DISCONNECTED)
-        if record.kind in _STREAMING:
+        self._heard[camera] = isinstance(record, (*_STREAMING, ConnectedRecord, DisconnectedRecord))
+        if isinstance(record, _STREAMING):
             text = "streaming since before the recorder was started"
             self._join(camera, record, phrase("camera_streaming_before", text))
 
@@ -294,24 +304,24 @@ class Assembler:
 
     def _note(self, camera: int, record: Record) -> None:
         """Handle a record that is not of a whole frame."""
-        match record.kind:
-            case RecordKind.DAMAGED:
+        match record:
+            case DamagedRecord():
                 self.pairer.damaged(camera, record)
-            case RecordKind.LATCH:
-                self.pairer.latch(camera, ClockLatch(record.device_time, record.host_time, record.value))
-            case RecordKind.CONNECTED:
+            case LatchRecord():
+                self.pairer.latch(camera, record.latch)
+            case ConnectedRecord():
                 self._join(camera, record, plain(record.text))
-            case RecordKind.DISCONNECTED:
+            case DisconnectedRecord():
                 self.disconnected(camera, plain(with_rig_in_use(record.text)), record.host_time)
-            case RecordKind.LIMITS:
+            case LimitsRecord():
                 limits = RegionLimits.model_validate_json(record.text)
                 self._limits.append(CameraLimits(camera=camera, limits=limits))
-            case RecordKind.NOTICE:
+            case NoticeRecord():
                 self._changes.append(
                     CameraChanged(camera=camera, news=CameraNews.NOTICE, said=plain(with_rig_in_use(record.text)))
                 )
 
-    def _place(self, camera: int, record: Record, pulse: OpenPulse) -> None:
+    def _place(self, camera: int, record: FrameRecord, pulse: OpenPulse) -> None:
         """Copy a frame into its triplet, or let it wait in its ring until a buffer is free."""
         part = pulse.cargo
         if not isinstance(part, _Composition):
@@ -363,7 +373,7 @@ class Assembler:
                 return slot
         return None
 
-    def _copy(self, camera: int, record: Record, slot: int) -> None:
+    def _copy(self, camera: int, record: FrameRecord, slot: int) -> None:
         self._unpack[camera](self._rings[camera].frame(record.slot), self._blocks_of(slot)[camera])
         self._rings[camera].release(record.slot)
 

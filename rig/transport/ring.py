@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import BadInputError
-from rig.frame import RECORD_BYTES, Record
+from rig.frame import RECORD_BYTES, FrameRecord, Record, pack_into, unpack_from
 
 _MAGIC = 0x3147_4E49_5256_5653  # "SVVRING1" read as a little-endian word
 _HEADER = struct.Struct("<QQQQ")  # magic, frame bytes, slots, queue capacity
@@ -139,8 +139,12 @@ class CameraRing:
         """Free a slot that the grabber took and did not queue."""
         self._map[_OWNERS + slot] = _FREE[0]
 
-    def put(self, record: Record) -> bool:
-        """Queue a record; the slot that it names, if any, belongs to the recorder from now on.
+    def put(self, record: Record, epoch: int) -> bool:
+        """Queue a record; the slot of a frame belongs to the recorder from now on.
+
+        Args:
+            record: the record.
+            epoch: number of the connection.
 
         Returns:
             False if the queue is full: the record is not queued, and the overflow is counted.
@@ -149,9 +153,9 @@ class CameraRing:
         if written - self._words[_READ] >= self._capacity:
             self._words[_OVERFLOW] += 1
             return False
-        if record.slot < self.slots:
+        if isinstance(record, FrameRecord):
             self._map[_OWNERS + record.slot] = _QUEUED[0]
-        record.pack_into(self._queue, written % self._capacity * RECORD_BYTES)
+        pack_into(record, epoch, self._queue, written % self._capacity * RECORD_BYTES)
         self._words[_WRITTEN] = written + 1
         return True
 
@@ -170,7 +174,7 @@ class CameraRing:
         read = self._words[_READ]
         if read == self._words[_WRITTEN]:
             return None
-        record = Record.unpack_from(self._queue, read % self._capacity * RECORD_BYTES)
+        record = unpack_from(self._queue, read % self._capacity * RECORD_BYTES)
         self._words[_READ] = read + 1
         return record
 
@@ -186,7 +190,8 @@ class CameraRing:
         """The slots that are named by records still in the queue."""
         read, written = self._words[_READ], self._words[_WRITTEN]
         places = (number % self._capacity * RECORD_BYTES for number in range(read, written))
-        return {Record.unpack_from(self._queue, place).slot for place in places}
+        records = (unpack_from(self._queue, place) for place in places)
+        return {record.slot for record in records if isinstance(record, FrameRecord)}
 
     def request_reconnect(self) -> None:
         """Ask the grabber to disconnect the camera and set it up anew."""

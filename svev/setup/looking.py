@@ -18,6 +18,7 @@ from capture.iidc.camera import IidcCamera
 from capture.seam import Camera, Commanded
 from rig.clocks import NS_PER_S, host_now
 from rig.errors import CameraError, SvevError
+from rig.frame import FrameRecord
 from rig.settings.camera import Backend, CameraSettings, Region
 from rig.settings.model import NetworkSettings
 from rig.settings.trigger import SoftwareTrigger
@@ -176,7 +177,7 @@ def _take(camera: Camera, ring: CameraRing, settings: CameraSettings, file: Path
         if isinstance(camera, Commanded):
             camera.fire()
         arrival = camera.receive(_TURN_S)
-        if arrival is not None and arrival.whole:
+        if isinstance(arrival, FrameRecord):
             rows, columns = settings.region.height, settings.region.width
             pixels = ring.frame(arrival.slot).reshape(rows, columns).copy()
             ring.return_slot(arrival.slot)

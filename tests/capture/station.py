@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from capture.grabber import Grabber
 from capture.seam import Camera, Commands
-from rig.frame import Record, RecordKind
+from rig.frame import FrameRecord, Record
 from rig.transport.ring import CameraRing
 from tests.support.waiting import wait_until
 
@@ -44,16 +44,16 @@ class Station:
 
     def take(self, *, release: bool = True) -> None:
         """Read all records, as the recorder does."""
-        for record in iter(self.ring.get, None):
+        while (record := self.ring.get()) is not None:
             self.records.append(record)
-            if release and record.kind is RecordKind.FRAME:
+            if release and isinstance(record, FrameRecord):
                 self.ring.release(record.slot)
 
-    def await_records(self, kind: RecordKind, count: int, *, release: bool = True) -> None:
+    def await_records(self, kind: type[Record], count: int, *, release: bool = True) -> None:
         """Read until `count` records of a kind have come."""
 
         def enough() -> bool:
             self.take(release=release)
-            return sum(record.kind is kind for record in self.records) >= count
+            return sum(isinstance(record, kind) for record in self.records) >= count
 
-        wait_until(enough, f"{count} records {kind.name}", 10)
+        wait_until(enough, f"{count} records {kind.__name__}", 10)

@@ -16,6 +16,7 @@ from capture.seam import Arrival, Camera
 from capture.sim.camera import SimCamera
 from rig.clocks import host_now
 from rig.errors import CameraError, CameraNotFoundError
+from rig.frame import FrameRecord
 from rig.settings.model import RigSettings
 from rig.transport.ring import CameraRing
 from service.processes.replayed_log import ReplayedLog
@@ -27,6 +28,7 @@ from simrig.world.faults import Fault
 from tests.capture.iidc.emulated import visible
 from tests.capture.replay.hill_log import write_fault, write_hill_log
 from tests.capture.rigs import make_rig
+from tests.capture.whole import whole_frames
 from tests.support.loopback import Loopback
 
 BACKENDS = ["sim", "aravis", "iidc", "replay"]
@@ -67,7 +69,7 @@ class Bench:
         assert target is not None
         target.inject(fault)
 
-    def stamp_of(self, arrival: Arrival) -> int:
+    def stamp_of(self, arrival: FrameRecord) -> int:
         """Hill pulse that the stamp in the frame names."""
         shape = (self.rig.cameras[0].region.height, self.rig.cameras[0].region.width)
         found = stamp.read(self.ring.frame(arrival.slot).reshape(shape))
@@ -151,8 +153,8 @@ def _collect(bench: Bench, camera: Camera, count: int) -> list[tuple[Arrival, in
         arrival = camera.receive(0.2)
         if arrival is None:
             continue
-        collected.append((arrival, bench.stamp_of(arrival) if arrival.whole else None))
-        if arrival.whole:
+        collected.append((arrival, bench.stamp_of(arrival) if isinstance(arrival, FrameRecord) else None))
+        if isinstance(arrival, FrameRecord):
             bench.ring.return_slot(arrival.slot)
     return collected
 
@@ -161,11 +163,11 @@ def test_every_pulse_gives_one_frame_with_its_own_pixels_id_and_time(bench: Open
     made = bench()
     with _warm(made) as camera:
         frames = _collect(made, camera, 20)
-    assert all(arrival.whole for arrival, _ in frames)
+    whole = whole_frames(arrival for arrival, _ in frames)
     pulses = np.array([pulse for _, pulse in frames])
     assert np.all(np.diff(pulses) == 1)
-    assert np.all(np.diff([arrival.frame_id for arrival, _ in frames]) == 1)
-    steps = np.diff([arrival.device_time for arrival, _ in frames])
+    assert np.all(np.diff([arrival.frame_id for arrival in whole]) == 1)
+    steps = np.diff([arrival.device_time for arrival in whole])
     assert np.all(np.abs(steps - PERIOD_NS) < 100_000)  # 100 ppm of drift and some us of jitter
 
 
@@ -175,6 +177,7 @@ def test_latch_ties_the_device_clock_to_the_host(bench: OpenBench) -> None:
         latch = min((camera.latch() for _ in range(20)), key=lambda taken: taken.round_trip_ns)
         ((arrival, pulse),) = _collect(made, camera, 1)
     assert pulse is not None
+    assert isinstance(arrival, FrameRecord)
     trigger = latch.host + (arrival.device_time - latch.device)
     fired = made.epoch + round(pulse * 1e9 / made.rig.trigger.rate_hz)
     assert abs(trigger - fired) <= latch.round_trip_ns / 2 + 100_000
@@ -214,7 +217,7 @@ def test_a_fault_costs_one_frame_and_the_ids_tell_why(
         arrivals = _collect(made, camera, 3)
         made.inject(kind, **fields)
         arrivals += _collect(made, camera, 12)
-    frames = [(pulse, arrival) for arrival, pulse in arrivals if pulse is not None]
+    frames = [(pulse, arrival) for arrival, pulse in arrivals if pulse is not None and isinstance(arrival, FrameRecord)]
     pulses = np.array([pulse for pulse, _ in frames])
     ids = np.array([arrival.frame_id for _, arrival in frames])
     times = np.array([arrival.device_time for _, arrival in frames])
@@ -249,15 +252,15 @@ def test_closing_gives_all_slots_back_and_the_camera_opens_again(bench: OpenBenc
 def test_a_recorder_that_holds_all_slots_costs_frames_but_nothing_breaks(bench: OpenBench) -> None:
     made = bench(slots=4)
     with _warm(made) as camera:
-        held: list[Arrival] = []
+        held: list[FrameRecord] = []
         while len(held) < made.ring.slots:
-            if (arrival := camera.receive(0.2)) is not None and arrival.whole:
+            if isinstance(arrival := camera.receive(0.2), FrameRecord):
                 held.append(arrival)
         last = made.stamp_of(held[-1])
         while camera.receive(0.2) is not None:
             pass
-        for arrival in held:
-            made.ring.return_slot(arrival.slot)
+        for frame in held:
+            made.ring.return_slot(frame.slot)
         pulses = [pulse for _, pulse in _collect(made, camera, 6) if pulse is not None]
     assert pulses
     assert pulses == sorted(set(pulses))
@@ -272,7 +275,7 @@ def test_a_dead_camera_is_an_error_in_bounded_time_and_comes_back_from_scratch(b
         with pytest.raises(CameraError):
             _use_until_it_fails(made, camera)
     with _reopened(made) as camera:
-        assert all(arrival.whole for arrival, _ in _collect(made, camera, 3))
+        assert all(isinstance(arrival, FrameRecord) for arrival, _ in _collect(made, camera, 3))
 
 
 @contextmanager
@@ -295,6 +298,6 @@ def _reopened(bench: Bench) -> Iterator[Camera]:
 def _use_until_it_fails(bench: Bench, camera: Camera) -> None:
     deadline = host_now() + 20_000_000_000
     while host_now() < deadline:
-        if (arrival := camera.receive(0.2)) is not None and arrival.whole:
+        if isinstance(arrival := camera.receive(0.2), FrameRecord):
             bench.ring.return_slot(arrival.slot)
         camera.latch()

@@ -2,7 +2,7 @@
 
 from capture.clock_reading import ClockReading
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
-from rig.frame import Record, RecordKind
+from rig.frame import FrameRecord
 from tests.triggering.simulation import MS, US
 from triggering.pairing.pairer import ClosedPulse, Pairer
 
@@ -42,8 +42,8 @@ class Feed:
         triggers: int = -1,
     ) -> bool:  # fmt: skip
         time = self.time_of(pulse)
-        record = Record(
-            RecordKind.FRAME, epoch, HostNs(time + after), 0, frame_id, 65535, DeviceNs(time - START + clock), triggers
+        record = FrameRecord(
+            HostNs(time + after), 0, frame_id, 65535, DeviceNs(time - START + clock), triggers, epoch=epoch
         )
         placed = self.pairer.frame(camera, record) is not None
         reading = self.readings[camera]

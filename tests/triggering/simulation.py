@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from capture.clock_reading import ClockReading
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
-from rig.frame import FrameStatus, Record, RecordKind
+from rig.frame import ConnectedRecord, DamagedRecord, DisconnectedRecord, FrameRecord, FrameStatus, LatchRecord, Record
 from triggering.pairing.pairer import ClosedPulse, OpenPulse, Pairer
 
 MS = 1_000_000
@@ -116,6 +116,12 @@ def _pulse_times(scenario: Scenario, start: HostNs, rng: random.Random) -> Itera
         time += period
 
 
+class _Torn(DamagedRecord, frozen=True):
+    """A damaged frame whose `slot` is a key into the truth, as that of a whole one."""
+
+    slot: int = 0
+
+
 class _Camera:
     """Makes the records of one camera."""
 
@@ -151,7 +157,7 @@ class _Camera:
         self.zero = self.last_arrival = host
         self.next_id = self.scenario.first_id if self.epoch == 1 else 1
         self.triggers = 0
-        self.put(host, Record(RecordKind.CONNECTED, self.epoch, host))
+        self.put(host, ConnectedRecord(host, epoch=self.epoch))
         self.latch_burst(HostNs(host + MS), 16, self.rng)
         self.next_burst = host + (self.scenario.latch_every_s or 1e9) * NS_PER_S
         self.reading = ClockReading()
@@ -162,11 +168,15 @@ class _Camera:
         begin = self.hill.start + outage.begin_s * NS_PER_S
         told = HostNs(round(begin + outage.told_after_s * NS_PER_S))
         for _, _, record in self.records:
-            if record.host_time > begin and record.slot in self.hill.pulse_of:
+            if (
+                isinstance(record, FrameRecord | _Torn)
+                and record.host_time > begin
+                and record.slot in self.hill.pulse_of
+            ):
                 # Frames on the way are lost with the camera.
                 self.hill.fates[self.hill.pulse_of.pop(record.slot)][self.camera] = FrameStatus.ABSENT
         self.records = [entry for entry in self.records if entry[0] <= begin]
-        self.put(told, Record(RecordKind.DISCONNECTED, self.epoch, told))
+        self.put(told, DisconnectedRecord(told, epoch=self.epoch))
         self.connect(HostNs(round(self.hill.start + outage.end_s * NS_PER_S)))
 
     def device(self, host: float) -> DeviceNs:
@@ -179,7 +189,7 @@ class _Camera:
             time = HostNs(host + index * 100 * US)
             read_at = time + rng.uniform(-0.5, 0.5) * round_trip
             device = self.device(read_at)
-            self.put(time, Record(RecordKind.LATCH, self.epoch, time, device_time=device, value=round_trip))
+            self.put(time, LatchRecord(ClockLatch(device, time, round_trip), self.epoch))
 
     def see(self, pulse: int, time: HostNs, outage: Outage | None) -> None:
         scenario, fates = self.scenario, self.hill.fates[pulse]
@@ -215,20 +225,17 @@ class _Camera:
         )  # fmt: skip
         self.last_arrival = arrival
         if fate is FrameStatus.DAMAGED:
-            # ids and times of a damaged frame are those of an earlier one
-            record = Record(RecordKind.DAMAGED, self.epoch, arrival, slot, 7, 0, DeviceNs(123))
+            about = None
             if self.scenario.damage_tells_time:
                 about = self.device(time + self.rng.randint(-MS // 5, MS // 5))
-                record = Record(RecordKind.DAMAGED, self.epoch, arrival, slot, 7, 0, about, value=1)
+            record: Record = _Torn(arrival, about, self.epoch, slot)
         else:
             noted = time + exposure * (self.camera in self.scenario.note_the_end)
             device = self.device(noted + self.rng.random() * self.scenario.jitter_ns)
             count = self.triggers if self.scenario.trigger_counts else -1
-            record = Record(
-                RecordKind.FRAME, self.epoch, arrival, slot, frame_id, self.scenario.modulus, device, count
-            )  # fmt: skip
+            record = FrameRecord(arrival, slot, frame_id, self.scenario.modulus, device, count, epoch=self.epoch)
         self.put(arrival, record)
-        taken = record.device_time if record.kind is RecordKind.FRAME else None
+        taken = record.device_time if isinstance(record, FrameRecord) else None
         if self.scenario.latch_every_s is not None and (self.reading.is_due(arrival, taken) or self.reading.wanted):
             read = max(arrival, self.reading.earliest)
             self.latch_burst(read, 1, self.link_rng)
@@ -281,21 +288,21 @@ class Run:
         self.pass_deadlines(None)
 
     def feed(self, camera: int, record: Record) -> None:
-        match record.kind:
-            case RecordKind.FRAME:
+        match record:
+            case FrameRecord():
                 pulse = self.pairer.frame(camera, record)
                 if pulse is not None or not self.pairer.holds(camera, record):
                     self.place(record, pulse)
-            case RecordKind.DAMAGED:
+            case DamagedRecord():
                 self.pairer.damaged(camera, record)
-            case RecordKind.LATCH:
-                self.pairer.latch(camera, ClockLatch(record.device_time, record.host_time, record.value))
-            case RecordKind.CONNECTED:
+            case LatchRecord():
+                self.pairer.latch(camera, record.latch)
+            case ConnectedRecord():
                 self.pairer.connected(camera, record.epoch, record.host_time)
-            case RecordKind.DISCONNECTED:
+            case DisconnectedRecord():
                 self.pairer.disconnected(camera, record.host_time)
 
-    def place(self, record: Record, pulse: OpenPulse | None) -> None:
+    def place(self, record: FrameRecord, pulse: OpenPulse | None) -> None:
         if pulse is None:
             self.unplaced.append(record.slot)
         else:
@@ -316,7 +323,7 @@ class Run:
         self.overdue |= set(self.pairer.overdue(now))
 
 
-def _load(pulse: OpenPulse, record: Record) -> None:
+def _load(pulse: OpenPulse, record: FrameRecord) -> None:
     """Keep the frame's slot in the cargo of the pulse, as the recorder does."""
     if pulse.cargo is None:
         pulse.cargo = []

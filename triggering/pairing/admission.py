@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from rig.clocks import HostNs
-from rig.frame import Record, RecordKind
+from rig.frame import FrameRecord
 from triggering.pairing.camera.plausibility import Verdict
 from triggering.pairing.camera.track import CameraTrack
 from triggering.pairing.held import HeldFrames
@@ -29,16 +29,16 @@ class Admission:
         self._tracks, self._held = tracks, held
         self._others = [OtherCameras(camera, tracks, pulses, held, train) for camera in range(len(tracks))]
 
-    def admits(self, camera: int, record: Record, time: HostNs) -> bool:
+    def admits(self, camera: int, record: FrameRecord, time: HostNs) -> bool:
         """Whether a frame that has just come, triggered at `time`, is accepted at once."""
         track = self._tracks[camera]
         if len(self._tracks) == 1 or not track.times.plausibility.warm:
             return True
-        if self._held.first(camera) is not None:
+        if self._held.any_of(camera):
             return False
         return track.judge_new(record, time, self._others[camera]) is Verdict.ACCEPTED
 
-    def settle(self, now: HostNs) -> Iterator[tuple[int, Record]]:
+    def settle(self, now: HostNs) -> Iterator[tuple[int, FrameRecord]]:
         """Accept or refuse the frames that wait, as far as can be told at host time `now`: cameras and frames."""
         for camera in range(len(self._tracks)):
             for record in self._settle(camera):
@@ -48,19 +48,19 @@ class Admission:
                 for record in self._settle_first(camera):
                     yield camera, record
 
-    def end_epoch(self, camera: int) -> Iterator[Record]:
+    def end_epoch(self, camera: int) -> Iterator[FrameRecord]:
         """Accept or refuse all frames of a camera that wait: no more evidence will come."""
         self._note_damage_behind(camera)
-        while self._held.first(camera) is not None:
+        while self._held.any_of(camera):
             yield from self._settle_first(camera)
 
     def refuse_all(self, camera: int) -> None:
         """Refuse all frames of a camera that wait: its clock was set."""
         self._note_damage_behind(camera)
-        while self._held.first(camera) is not None:
-            self._refuse_first(camera)
+        for record in self._held.frames(camera):
+            self._refuse(camera, record)
 
-    def _settle(self, camera: int) -> Iterator[Record]:
+    def _settle(self, camera: int) -> Iterator[FrameRecord]:
         """Accept or refuse the frames of a camera that wait, as far as the evidence goes."""
         track, others = self._tracks[camera], self._others[camera]
         while waiting := self._held.frames(camera):
@@ -70,34 +70,36 @@ class Admission:
             if verdict is Verdict.WAITS:
                 return
             if verdict is Verdict.ACCEPTED:
-                yield self._held.take(camera)
-                self._note_damage_behind(camera)
+                yield from self._accept(camera, waiting[0])
             else:
-                self._refuse_first(camera, rejected=True)
+                track.doubt()
+                self._refuse(camera, waiting[0])
 
-    def _settle_first(self, camera: int) -> Iterator[Record]:
+    def _settle_first(self, camera: int) -> Iterator[FrameRecord]:
         """Accept or refuse the first frame of a camera that waits, which has waited for as long as it may."""
         waiting = self._held.frames(camera)
         if waiting:
             if self._tracks[camera].judge(waiting, self._others[camera], final=True) is Verdict.ACCEPTED:
-                yield self._held.take(camera)
-                self._note_damage_behind(camera)
+                yield from self._accept(camera, waiting[0])
             else:
-                self._refuse_first(camera)
+                self._refuse(camera, waiting[0])
         yield from self._settle(camera)
 
-    def _refuse_first(self, camera: int, *, rejected: bool = False) -> None:
+    def _accept(self, camera: int, record: FrameRecord) -> Iterator[FrameRecord]:
+        """Accept the first frame of a camera that waits."""
+        self._held.take(camera)
+        yield record
+        self._note_damage_behind(camera)
+
+    def _refuse(self, camera: int, record: FrameRecord) -> None:
         """Refuse the first frame of a camera that waits."""
-        track, record = self._tracks[camera], self._held.take(camera)
-        if rejected:
-            track.reject(record)
-        else:
-            track.refuse(record)
+        self._held.take(camera)
+        self._tracks[camera].refuse(record)
         self._held.release(camera, record, None)
         self._note_damage_behind(camera)
 
     def _note_damage_behind(self, camera: int) -> None:
         """Enter the damaged arrivals behind a frame that no longer waits."""
         track = self._tracks[camera]
-        while (behind := self._held.first(camera)) is not None and behind.kind is RecordKind.DAMAGED:
-            track.note_damage(self._held.take(camera))
+        while (behind := self._held.take_damaged(camera)) is not None:
+            track.note_damage(behind)

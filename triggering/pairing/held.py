@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from rig.clocks import NS_PER_S, HostNs
-from rig.frame import Record, RecordKind
+from rig.frame import DamagedRecord, FrameRecord
 from triggering.pairing.outcomes import OpenPulse
 
 #: The clock is read right after a frame that comes out of turn, and four times a second. If the camera does not answer
@@ -20,7 +20,7 @@ class Released(NamedTuple):
     """A frame that was held, and its pulse; None: it belongs to none."""
 
     camera: int
-    record: Record
+    record: FrameRecord
     pulse: OpenPulse | None
 
 
@@ -32,23 +32,22 @@ class HeldFrames:
     """
 
     def __init__(self, cameras: int) -> None:
-        self._queues: list[deque[Record]] = [deque() for _ in range(cameras)]
+        self._queues: list[deque[FrameRecord | DamagedRecord]] = [deque() for _ in range(cameras)]
         self._released: list[Released] = []
         self.count = 0
 
-    def hold(self, camera: int, record: Record) -> None:
+    def hold(self, camera: int, record: FrameRecord | DamagedRecord) -> None:
         """Let a frame wait behind those of its camera that wait already."""
         self._queues[camera].append(record)
         self.count += 1
 
-    def first(self, camera: int) -> Record | None:
-        """The frame of a camera that waits the longest; None: none waits."""
-        queue = self._queues[camera]
-        return queue[0] if queue else None
+    def any_of(self, camera: int) -> bool:
+        """Whether a frame of a camera waits."""
+        return bool(self._queues[camera])
 
-    def frames(self, camera: int) -> list[Record]:
+    def frames(self, camera: int) -> list[FrameRecord]:
         """The whole frames of a camera that wait, in order."""
-        return [record for record in self._queues[camera] if record.kind is RecordKind.FRAME]
+        return [record for record in self._queues[camera] if isinstance(record, FrameRecord)]
 
     def ended(self, now: HostNs) -> list[int]:
         """The cameras whose frames have waited for as long as they may."""
@@ -73,8 +72,8 @@ class HeldFrames:
             if queue:
                 yield camera, HostNs(queue[0].host_time + _LONGEST_NS)
 
-    def has(self, camera: int, record: Record) -> bool:
-        """Whether a frame is the last one of its camera that waits, or has waited and will be told by `released`."""
+    def has(self, camera: int, record: FrameRecord) -> bool:
+        """Whether a frame is the last one of its camera that waits, or has waited and `released` will return it."""
         queue = self._queues[camera]
         return (bool(queue) and queue[-1] is record) or any(each.record is record for each in self._released)
 
@@ -82,12 +81,20 @@ class HeldFrames:
         """When the first of all has waited for as long as it may; None: none waits."""
         return min((end for _, end in self._ends()), default=None)
 
-    def take(self, camera: int) -> Record:
+    def take(self, camera: int) -> FrameRecord | DamagedRecord:
         """Take a camera's first frame out."""
         self.count -= 1
         return self._queues[camera].popleft()
 
-    def release(self, camera: int, record: Record, pulse: OpenPulse | None) -> None:
+    def take_damaged(self, camera: int) -> DamagedRecord | None:
+        """Take a camera's first frame out if it is damaged."""
+        queue = self._queues[camera]
+        if queue and isinstance(first := queue[0], DamagedRecord):
+            self.take(camera)
+            return first
+        return None
+
+    def release(self, camera: int, record: FrameRecord, pulse: OpenPulse | None) -> None:
         """Note what became of a frame that was taken out."""
         self._released.append(Released(camera, record, pulse))
 

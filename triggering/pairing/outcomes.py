@@ -6,7 +6,7 @@ from typing import Final
 import msgspec
 
 from rig.clocks import HostNs
-from rig.frame import FrameStatus, Record
+from rig.frame import FrameRecord, FrameStatus
 from rig.pulse import RigPulse
 
 
@@ -38,7 +38,7 @@ class OpenPulse:
     ) -> None:
         self.cargo: object | None = None
         self.time = time
-        self.frames: list[Record | None] = [None] * cameras
+        self.frames: list[FrameRecord | None] = [None] * cameras
         self.times: list[HostNs | None] = [None] * cameras
         self.missing = cameras
         self.delivered = 0
@@ -46,7 +46,7 @@ class OpenPulse:
         self.unwatched = unwatched
         self.fired = fired
 
-    def add(self, camera: int, record: Record, time: HostNs) -> None:
+    def add(self, camera: int, record: FrameRecord, time: HostNs) -> None:
         """Add a camera's frame, triggered at `time`."""
         self.frames[camera] = record
         self.times[camera] = time
@@ -76,7 +76,7 @@ class Outcome(msgspec.Struct, frozen=True):
     """
 
     status: FrameStatus
-    record: Record | None = None
+    record: FrameRecord | None = None
     offset_ns: int | None = None
     overrun: bool = False
 

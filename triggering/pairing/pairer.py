@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from rig.clocks import NS_PER_S, ClockLatch, HostNs
 from rig.errors import BadInputError
-from rig.frame import FrameStatus, Record
+from rig.frame import DamagedRecord, FrameRecord, FrameStatus
 from rig.health import CameraCounters, PairingHealth
 from rig.pulse import RigPulse
 from triggering.pairing.admission import Admission
@@ -84,7 +84,7 @@ class Pairer:
 
     # -- records in ----------------------------------------------------------------------------------------------
 
-    def frame(self, camera: int, record: Record) -> OpenPulse | None:
+    def frame(self, camera: int, record: FrameRecord) -> OpenPulse | None:
         """Assign a whole frame to its pulse, or hold it until its trigger time can be judged.
 
         Returns:
@@ -106,7 +106,7 @@ class Pairer:
             track.counters.stale += 1
         return None
 
-    def holds(self, camera: int, record: Record) -> bool:
+    def holds(self, camera: int, record: FrameRecord) -> bool:
         """Whether a frame for which `frame` has returned no pulse waits; `released` will tell what became of it."""
         return self._held.has(camera, record)
 
@@ -123,14 +123,14 @@ class Pairer:
                 self._release(camera, record)
         return self._held.released()
 
-    def damaged(self, camera: int, record: Record) -> None:
+    def damaged(self, camera: int, record: DamagedRecord) -> None:
         """Enter a damaged arrival; only the times of the record are used."""
         track = self._tracks[camera]
         if not self._is_current(track, record):
             return
         if not track.connected:
             track.counters.stale += 1
-        elif self._held.first(camera) is not None:
+        elif self._held.any_of(camera):
             self._held.hold(camera, record)
         else:
             track.note_damage(record)
@@ -246,7 +246,7 @@ class Pairer:
 
     # -- details -------------------------------------------------------------------------------------------------
 
-    def _is_current(self, track: CameraTrack, record: Record) -> bool:
+    def _is_current(self, track: CameraTrack, record: FrameRecord | DamagedRecord) -> bool:
         """Whether a record is of the camera's present epoch; the first epoch may begin without `connected`."""
         epoch = track.presence.epoch
         if record.epoch == epoch:
@@ -262,12 +262,12 @@ class Pairer:
         for record in self._admission.end_epoch(camera):
             self._release(camera, record)
 
-    def _release(self, camera: int, record: Record) -> None:
+    def _release(self, camera: int, record: FrameRecord) -> None:
         """Place an accepted frame that waited until now."""
         time = self._tracks[camera].times.trigger_time(record.device_time)
         self._held.release(camera, record, self._place(camera, record, time))
 
-    def _place(self, camera: int, record: Record, time: HostNs) -> OpenPulse | None:
+    def _place(self, camera: int, record: FrameRecord, time: HostNs) -> OpenPulse | None:
         """Assign a frame, triggered at `time`, to its pulse; None if there is no open one."""
         track, train = self._tracks[camera], self._train
         clock = track.times.clock

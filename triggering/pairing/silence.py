@@ -45,13 +45,13 @@ class Silence:
             since = max(since, HostNs(now - hold_ns))
             behind = [pulse.time for pulse in waiting if pulse.frames[camera] is None and pulse.time > since]
             late = len(behind) >= SILENT_PERIODS and now > behind[0] + track.latency_ns + HELD_BACK_NS
-            if late and track.connected and not track.is_slow(now) and self._held.first(camera) is None:
+            if late and track.connected and not track.is_slow(now) and not self._held.any_of(camera):
                 yield camera
 
     def decide(self, pulse: OpenPulse, waiting: Sequence[OpenPulse], now: HostNs) -> None:
         """At the deadline of a pulse, find which of the cameras without a frame of it are silent."""
         for camera, track in enumerate(self._tracks):
-            if pulse.frames[camera] is not None or self._held.first(camera) is not None:
+            if pulse.frames[camera] is not None or self._held.any_of(camera):
                 continue
             if not track.may_deliver(pulse.time) or track.activity.alive > pulse.time:
                 continue

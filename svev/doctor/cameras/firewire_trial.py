@@ -14,6 +14,7 @@ from capture.iidc.device import Device
 from capture.seam import Arrival
 from rig.clocks import NS_PER_S, NS_PER_US, host_now
 from rig.errors import BadInputError, CameraError
+from rig.frame import FrameRecord
 from rig.phrase import phrase
 from rig.settings.camera import CameraSettings
 from rig.transport.ring import CameraRing
@@ -41,12 +42,13 @@ def try_camera(settings: CameraSettings, rate_hz: float) -> Iterator[Finding]:
                 yield passed(Topic.CAMERAS, "check_trial_set_up", what, camera=name, description=camera.description)
                 camera.start()
                 arrivals = _collect(camera, ring, _TRIAL_NS)
-                if not any(arrival.whole for arrival in arrivals):
+                whole = _whole(arrivals)
+                if not whole:
                     yield _nothing_came(name, len(arrivals))
                     return
-                yield from _judge(settings, camera, arrivals, rate_hz)
+                yield from _judge(settings, camera, whole, len(arrivals) - len(whole), rate_hz)
                 if camera.byte_order is not None:
-                    yield _judge_delay(settings, camera, ring, [arrival for arrival in arrivals if arrival.whole])
+                    yield _judge_delay(settings, camera, ring, whole)
                 yield _try_bus_reset(settings, camera, ring)
         except (CameraError, BadInputError) as error:
             yield told(str(error))
@@ -58,9 +60,13 @@ def _collect(camera: IidcCamera, ring: CameraRing, duration_ns: int) -> list[Arr
     while (now := host_now()) < deadline:
         if (arrival := camera.receive((deadline - now) / NS_PER_S)) is not None:
             arrivals.append(arrival)
-            if arrival.whole:
+            if isinstance(arrival, FrameRecord):
                 ring.return_slot(arrival.slot)
     return arrivals
+
+
+def _whole(arrivals: list[Arrival]) -> list[FrameRecord]:
+    return [arrival for arrival in arrivals if isinstance(arrival, FrameRecord)]
 
 
 def _nothing_came(name: str, damaged: int) -> Finding:
@@ -73,15 +79,16 @@ def _nothing_came(name: str, damaged: int) -> Finding:
     return warning(Topic.CAMERAS, "check_trial_silent", what, remedy, camera=name, seconds=_TRIAL_NS / NS_PER_S)
 
 
-def _judge(settings: CameraSettings, camera: IidcCamera, arrivals: list[Arrival], rate_hz: float) -> Iterator[Finding]:
+def _judge(
+    settings: CameraSettings, camera: IidcCamera, whole: list[FrameRecord], damaged: int, rate_hz: float
+) -> Iterator[Finding]:
     name = settings.name
-    whole = [arrival for arrival in arrivals if arrival.whole]
     first, last = whole[0], whole[-1]
     taken = last.frame_id - first.frame_id
     span_s = (last.device_time - first.device_time) / NS_PER_S
     triggers = last.trigger_count - first.trigger_count
     yield _judge_rate(name, (triggers or taken) / span_s if span_s else 0.0, rate_hz)
-    lost, damaged = taken + 1 - len(whole), len(arrivals) - len(whole)
+    lost = taken + 1 - len(whole)
     if lost or damaged:
         yield warning(
             Topic.CAMERAS,
@@ -126,12 +133,12 @@ def _judge_triggers(name: str, triggers: int, frames: int) -> Finding:
     )
 
 
-def _judge_delay(settings: CameraSettings, camera: IidcCamera, ring: CameraRing, whole: list[Arrival]) -> Finding:
+def _judge_delay(settings: CameraSettings, camera: IidcCamera, ring: CameraRing, whole: list[FrameRecord]) -> Finding:
     """Is the time in the signature the beginning of the exposure, as it should be?"""
     expected_ns = round(settings.exposure_us * NS_PER_US) + READOUT_NS
     for trial in range(_DELAY_TRIALS):
         if trial:
-            whole = [arrival for arrival in _collect(camera, ring, _TRIAL_NS) if arrival.whole] or whole
+            whole = _whole(_collect(camera, ring, _TRIAL_NS)) or whole
         latch = camera.latch()
         latency_ns = min(arrival.host_time - latch.host - (arrival.device_time - latch.device) for arrival in whole)
         measured_ns = latency_ns - camera.transport_ns
@@ -155,7 +162,7 @@ def _try_bus_reset(settings: CameraSettings, camera: IidcCamera, ring: CameraRin
         return warning(
             Topic.CAMERAS, "check_trial_reset_ends", what, _AFTER_RESET, camera=settings.name, why=str(error)
         )
-    if any(arrival.whole for arrival in arrivals):
+    if _whole(arrivals):
         return passed(Topic.CAMERAS, "check_trial_reset", "{camera} goes on after a bus reset", camera=settings.name)
     what = "{camera}: no frame came after a bus reset"
     return warning(Topic.CAMERAS, "check_trial_reset_silent", what, _AFTER_RESET, camera=settings.name)

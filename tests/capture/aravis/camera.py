@@ -8,6 +8,7 @@ from typing import Any
 from capture.aravis.camera import AravisCamera
 from capture.seam import Arrival
 from rig.clocks import host_now
+from rig.frame import FrameRecord
 from rig.settings.model import RigSettings
 from rig.transport.ring import CameraRing
 from service.processes.simulation import simulated_hill
@@ -58,10 +59,10 @@ class OneCamera:
         while len(found) < count:
             assert host_now() < deadline, f"only {len(found)} of {count} frames came"
             if (arrival := camera.receive(0.2)) is not None:
-                found.append((arrival, self._pulse(arrival) if arrival.whole else -1))
+                found.append((arrival, self._pulse(arrival) if isinstance(arrival, FrameRecord) else -1))
         return found
 
-    def _pulse(self, arrival: Arrival) -> int:
+    def _pulse(self, arrival: FrameRecord) -> int:
         region = self.rig.cameras[0].region
         read = stamp.read(self.ring.frame(arrival.slot).reshape(region.height, region.width))
         assert read is not None, "the frame is not the camera's"

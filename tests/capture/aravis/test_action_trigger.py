@@ -11,7 +11,7 @@ from capture.aravis.camera import AravisCamera
 from rig.action import ActionKeys
 from rig.clocks import HostNs, host_now
 from rig.errors import CameraError
-from rig.frame import RecordKind
+from rig.frame import FrameRecord, LatchRecord
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger
 from rig.transport.ring import CameraRing
@@ -106,15 +106,15 @@ def test_scheduled_commands_by_broadcast_expose_all_cameras_at_whole_multiples_o
             stations = []
             for index, ring in enumerate(hill.rings):
                 stations.append(stack.enter_context(Station(partial(hill.open, index), ring)))
-                stations[-1].await_records(RecordKind.LATCH, 16)
+                stations[-1].await_records(LatchRecord, 16)
             sender = stack.enter_context(hill.sender(trigger))
             assert sender.seen([True, True], [PTP_NS, PTP_NS]) == []
             for station in stations:
-                station.await_records(RecordKind.FRAME, 8)
+                station.await_records(FrameRecord, 8)
             told = sender.read()
             assert min(each.acknowledged for each in sender.counts) >= 7, told
     times = [
-        [record.device_time for record in station.records if record.kind is RecordKind.FRAME] for station in stations
+        [record.device_time for record in station.records if isinstance(record, FrameRecord)] for station in stations
     ]
     punctual = [[time for time in each if (time + 5_000) % trigger.period_ns < 10_000] for each in times]
     assert all(len(each) >= 5 for each in punctual), "the busy machine made too many commands late"
@@ -128,10 +128,10 @@ def test_commands_at_once_to_each_camera_by_the_names_of_another_maker(
 ) -> None:
     """The trigger is Action0 or Action1, and which action's keys are set is a number, a name, or cannot be chosen."""
     with _hill(tmp_path, loopback, maker) as hill, Station(partial(hill.open, 0), hill.rings[0]) as station:
-        station.await_records(RecordKind.LATCH, 16)
+        station.await_records(LatchRecord, 16)
         with hill.sender(_trigger()) as sender:
             sender.seen([True, False], [None, None])
-            station.await_records(RecordKind.FRAME, 4)
+            station.await_records(FrameRecord, 4)
             sender.read()
             counts = sender.counts
     assert counts[0].acknowledged >= 3

@@ -13,6 +13,7 @@ from capture.aravis.camera import AravisCamera
 from capture.aravis.wire import Wire
 from rig.clocks import NS_PER_S, host_now
 from rig.errors import CameraError
+from rig.frame import FrameRecord
 from rig.settings.model import PacketDelay, RigSettings
 from rig.transport.ring import CameraRing
 from simrig.gige.camera import Camera
@@ -125,7 +126,7 @@ def frames_of(camera: AravisCamera, made: OnRig, count: int) -> tuple[list[int],
     while len(pulses) < count:
         assert host_now() < deadline
         arrival = camera.receive(0.2)
-        if arrival is None or not arrival.whole:
+        if not isinstance(arrival, FrameRecord):
             pulses, times = [], []  # a busy machine lost one: begin again
             continue
         read = stamp.read(made.ring.frame(arrival.slot).reshape(region.height, region.width))

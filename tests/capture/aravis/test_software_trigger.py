@@ -9,7 +9,7 @@ import pytest
 from capture.aravis.camera import AravisCamera
 from rig.clocks import HostNs, host_now
 from rig.errors import CameraError
-from rig.frame import Record, RecordKind
+from rig.frame import FrameRecord, LatchRecord, NoticeRecord, Record
 from rig.settings.model import RigSettings
 from rig.settings.trigger import SoftwareTrigger
 from rig.transport.ring import CameraRing
@@ -46,10 +46,10 @@ def _camera(rig: RigSettings, *, clock: bool = True, maker: Maker = Maker.STANDA
 
 def _host_times(records: list[Record]) -> list[HostNs]:
     """Trigger times of the frames on the host's clock, by the best reading of the camera's."""
-    latches = [record for record in records if record.kind is RecordKind.LATCH]
-    best = min(latches, key=lambda record: record.value)
-    frames = [record for record in records if record.kind is RecordKind.FRAME]
-    return [HostNs(best.host_time + (record.device_time - best.device_time)) for record in frames]
+    latches = [record.latch for record in records if isinstance(record, LatchRecord)]
+    best = min(latches, key=lambda latch: latch.round_trip_ns)
+    frames = [record for record in records if isinstance(record, FrameRecord)]
+    return [HostNs(best.host + (record.device_time - best.device)) for record in frames]
 
 
 @pytest.mark.parametrize("clock", [True, False])
@@ -63,14 +63,14 @@ def test_a_camera_exposes_at_each_command(tmp_path: Path, loopback: Loopback, cl
         return AravisCamera(rig.cameras[0], rig.network, ring, trigger.period_ns, trigger)
 
     with _camera(rig, clock=clock) as ring, Station(opened, ring, source.commands(origin)) as station:
-        station.await_records(RecordKind.FRAME, _FRAMES)
-    frames = [record for record in station.records if record.kind is RecordKind.FRAME]
+        station.await_records(FrameRecord, _FRAMES)
+    frames = [record for record in station.records if isinstance(record, FrameRecord)]
     placed = [divmod(time - origin, trigger.period_ns) for time in _host_times(station.records)]
     assert len({pulse for pulse, _ in placed}) == len(frames)
     drift_ns = 500_000  # 100 ppm of some seconds
     assert max(late for _, late in placed) <= source.spread_ns + drift_ns
     assert all(frame.host_time > time for frame, time in zip(frames, _host_times(station.records), strict=True))
-    notices = [record.text for record in station.records if record.kind is RecordKind.NOTICE]
+    notices = [record.text for record in station.records if isinstance(record, NoticeRecord)]
     assert [True for notice in notices if "its clock cannot be read: its frames have the times" in notice] == (
         [] if clock else [True]
     )
@@ -115,8 +115,8 @@ def test_commands_that_come_too_late_are_told_of(tmp_path: Path, loopback: Loopb
         return AravisCamera(rig.cameras[0], rig.network, ring, trigger.period_ns, trigger)
 
     with _camera(rig) as ring, Station(opened, ring, commands) as station:
-        station.await_records(RecordKind.NOTICE, 1)
-    (notice,) = [record.text for record in station.records if record.kind is RecordKind.NOTICE]
+        station.await_records(NoticeRecord, 1)
+    (notice,) = [record.text for record in station.records if isinstance(record, NoticeRecord)]
     assert "pulses had no command, which would have come too late: this computer is too slow for them" in notice
 
 
@@ -129,11 +129,11 @@ def test_a_camera_that_was_not_told_to_expose_is_not_silent(tmp_path: Path, loop
         return AravisCamera(rig.cameras[0], rig.network, ring, trigger.period_ns, trigger)
 
     with _camera(rig) as ring, Station(opened, ring, commands) as station:
-        station.await_records(RecordKind.FRAME, 1)
+        station.await_records(FrameRecord, 1)
         ring.request_reconnect()
         wait_until(lambda: commands.left < -100, "the grabber has looked for a frame for some time", 20)
         commands.left = 3
-        station.await_records(RecordKind.FRAME, 2)
+        station.await_records(FrameRecord, 2)
     assert {record.epoch for record in station.records} == {1}
 
 

@@ -19,6 +19,7 @@ from capture.iidc.structures import Feature
 from capture.seam import Arrival
 from rig.clocks import host_now
 from rig.errors import CameraError, CameraNotFoundError
+from rig.frame import FrameRecord
 from rig.pulse import HillPulse
 from rig.settings.camera import CameraSettings
 from rig.transport.ring import CameraRing
@@ -26,6 +27,7 @@ from simrig.images import stamp
 from simrig.world.faults import Fault, FaultKind
 from tests.capture.iidc.emulated import GUIDS, camera_ring, emulated_bus, settings
 from tests.capture.rigs import SCENARIO
+from tests.capture.whole import whole_frames
 
 PERIOD_NS = 33_333_333
 RATE_HZ = 30.0
@@ -55,7 +57,7 @@ def collect(camera: IidcCamera, ring: CameraRing, count: int) -> list[Arrival]:
         assert host_now() < deadline, f"only {len(arrivals)} of {count} arrivals came"
         if (arrival := camera.receive(0.2)) is not None:
             arrivals.append(arrival)
-            if arrival.whole:
+            if isinstance(arrival, FrameRecord):
                 ring.return_slot(arrival.slot)
     return arrivals
 
@@ -97,7 +99,7 @@ def test_the_level_of_the_pulse_can_be_the_exposure() -> None:
     camera = settings(iidc={"trigger_mode": 1})
     with emulated_bus(), running(camera) as (made, ring), register_access() as device:
         assert read_back(device, "external_trigger_get_mode") == 385
-        assert all(arrival.whole for arrival in collect(made, ring, 3))
+        assert all(isinstance(arrival, FrameRecord) for arrival in collect(made, ring, 3))
 
 
 def test_at_half_the_rate_packets_are_half_as_large() -> None:
@@ -105,7 +107,7 @@ def test_at_half_the_rate_packets_are_half_as_large() -> None:
     with emulated_bus(rate_hz=15.0), camera_ring(camera) as ring, closing(IidcCamera(camera, ring, 15.0)) as made:
         assert "652 bandwidth units" in made.description
         made.start()
-        assert all(arrival.whole for arrival in collect(made, ring, 3))
+        assert all(isinstance(arrival, FrameRecord) for arrival in collect(made, ring, 3))
 
 
 def test_a_slow_frame_of_more_packets_than_the_kernel_keeps_headers_of_is_one_frame() -> None:
@@ -113,8 +115,7 @@ def test_a_slow_frame_of_more_packets_than_the_kernel_keeps_headers_of_is_one_fr
     with emulated_bus(rate_hz=7.0), camera_ring(camera) as ring, closing(IidcCamera(camera, ring, 7.0)) as made:
         assert made.transport_ns == 960 * 125_000
         made.start()
-        arrivals = collect(made, ring, 4)
-    assert all(arrival.whole for arrival in arrivals)
+        arrivals = whole_frames(collect(made, ring, 4))
     assert [b.frame_id - a.frame_id for a, b in pairwise(arrivals)] == [1, 1, 1]
 
 
@@ -132,7 +133,7 @@ def test_pulses_of_a_hand_about_one_a_second(tmp_path: Path) -> None:
         made.start()
         for _ in range(5):
             (arrival,) = collect(made, ring, 1)
-            assert arrival.whole
+            assert isinstance(arrival, FrameRecord)
             pulse = stamp.read(ring.frame(arrival.slot).reshape(480, 640))
             assert pulse is not None
             seen.append(pulse.pulse)
@@ -145,7 +146,7 @@ def test_pulses_of_a_hand_about_one_a_second(tmp_path: Path) -> None:
 def test_frames_are_signed_and_the_signed_pixels_are_named() -> None:
     camera = settings()
     with emulated_bus() as hill, running(camera) as (made, ring):
-        arrivals = collect(made, ring, 5)
+        arrivals = whole_frames(collect(made, ring, 5))
         latch = made.latch()
         trigger = latch.host + arrivals[-1].device_time - latch.device
         pulse = stamp.read(ring.frame(arrivals[-1].slot).reshape(480, 640))
@@ -158,9 +159,8 @@ def test_frames_are_signed_and_the_signed_pixels_are_named() -> None:
 def test_the_low_byte_first_is_understood_too() -> None:
     camera = settings()
     with emulated_bus(signature="little"), running(camera) as (made, ring):
-        arrivals = collect(made, ring, 5)
+        arrivals = whole_frames(collect(made, ring, 5))
     ids = [arrival.frame_id for arrival in arrivals]
-    assert all(arrival.whole for arrival in arrivals)
     assert ids == list(range(ids[0], ids[0] + 5))
     assert ids[0] < 10
 
@@ -169,7 +169,7 @@ def test_without_a_signature_packets_tell_the_time() -> None:
     camera = settings()
     with emulated_bus(signature="none") as hill, running(camera) as (made, ring):
         assert "no signature" in made.description
-        arrivals = collect(made, ring, 6)
+        arrivals = whole_frames(collect(made, ring, 6))
         pulse = stamp.read(ring.frame(arrivals[-1].slot).reshape(480, 640))
         assert pulse is not None
         latch = made.latch()
@@ -187,38 +187,40 @@ def test_a_signature_that_is_not_wanted_is_switched_off() -> None:
             assert not device.read_advanced(0x600) & 0x02000000
             assert "no signature" in made.description
             made.start()
-            assert {arrival.stamped for arrival in collect(made, ring, 3)} == {None}
+            assert {arrival.stamped for arrival in whole_frames(collect(made, ring, 3))} == {None}
 
 
 @pytest.mark.parametrize("packet", [1, 2, 100, 240])
 def test_a_lost_packet_never_passes_as_a_picture(packet: int) -> None:
     camera = settings()
     with emulated_bus() as hill, running(camera) as (made, ring):
-        before = collect(made, ring, 3)
+        before = whole_frames(collect(made, ring, 3))
         hill.inject(Fault(kind=FaultKind.LOST_PACKETS, camera="K1", packets=(packet,)))
         after: list[Arrival] = []
         while len(after) < 10:
             after += collect(made, ring, 1)
-            if after[-1].whole:
-                found = stamp.read(ring.frame(after[-1].slot).reshape(480, 640))
+            if isinstance(last := after[-1], FrameRecord):
+                found = stamp.read(ring.frame(last.slot).reshape(480, 640))
                 assert found is not None, "a torn frame was delivered as whole"
-    whole = [arrival for arrival in after if arrival.whole]
-    damaged = [arrival for arrival in after if not arrival.whole]
+    whole = [arrival for arrival in after if isinstance(arrival, FrameRecord)]
+    damaged = [arrival for arrival in after if not isinstance(arrival, FrameRecord)]
     steps = {b.frame_id - a.frame_id for a, b in zip([before[-1], *whole], whole, strict=False)}
     if packet == 1:  # the whole frame is skipped
         assert (len(damaged), steps) == (0, {1, 2})
     else:
         assert (len(damaged), steps) == (1, {1, 3})
-        last = max(arrival.device_time for arrival in [*before, *whole] if arrival.device_time < damaged[0].device_time)
-        assert abs(damaged[0].device_time - last - PERIOD_NS) < 1_000_000
+        torn = damaged[0].device_time
+        assert torn is not None
+        before_it = max(arrival.device_time for arrival in [*before, *whole] if arrival.device_time < torn)
+        assert abs(torn - before_it - PERIOD_NS) < 1_000_000
 
 
 def test_an_overrun_counts_a_trigger_but_no_frame() -> None:
     camera = settings()
     with emulated_bus() as hill, running(camera) as (made, ring):
-        arrivals = collect(made, ring, 3)
+        arrivals = whole_frames(collect(made, ring, 3))
         hill.inject(Fault(kind=FaultKind.OVERRUN, camera="K1"))
-        arrivals += collect(made, ring, 8)
+        arrivals += whole_frames(collect(made, ring, 8))
     behind = [arrival.trigger_count - arrival.frame_id for arrival in arrivals]
     assert sorted(set(behind)) == [0, 1]
     assert behind == sorted(behind)
@@ -232,7 +234,7 @@ def test_a_bus_reset_is_noticed_and_costs_nothing() -> None:
         arrivals = collect(made, ring, 6)
         assert made.notices() == ["FireWire bus reset; the camera goes on as it was set"]
         assert made.notices() == []
-    ids = [arrival.frame_id for arrival in [*first, *arrivals]]
+    ids = [arrival.frame_id for arrival in whole_frames([*first, *arrivals])]
     assert ids == list(range(ids[0], ids[0] + len(ids)))
 
 
@@ -256,7 +258,7 @@ def test_what_a_crashed_run_left_on_is_switched_off() -> None:
         with opened(camera, ring) as made:
             assert not device.transmits()
             made.start()
-            assert collect(made, ring, 2)[0].frame_id < 10
+            assert whole_frames(collect(made, ring, 2))[0].frame_id < 10
         assert not device.transmits()
 
 
@@ -276,8 +278,7 @@ def test_a_region_of_the_sensor() -> None:
     camera = settings(region=region)
     with emulated_bus(), running(camera) as (made, ring):
         assert "400 x 300 from 100, 60" in made.description
-        arrivals = collect(made, ring, 4)
-        assert all(arrival.whole for arrival in arrivals)
+        arrivals = whole_frames(collect(made, ring, 4))
         assert stamp.read(ring.frame(arrivals[-1].slot).reshape(300, 400)) is not None
 
 
@@ -306,13 +307,13 @@ def test_what_the_camera_cannot_do_is_said_before_it_starts(changes: dict[str, A
 def test_a_stall_longer_than_the_ring_loses_frames_but_mixes_none() -> None:
     camera = settings()
     with emulated_bus() as hill, running(camera) as (made, ring):
-        first = collect(made, ring, 2)[-1]
+        (_, first) = whole_frames(collect(made, ring, 2))
         stalled_until = hill.train.time(HillPulse(hill.train.next_index(host_now()) + 80))  # the ring holds 64
         wait_until_host(stalled_until)
         arrivals = collect(made, ring, 70)
-        last = stamp.read(ring.frame(arrivals[-1].slot).reshape(480, 640))
+        whole = [arrival for arrival in arrivals if isinstance(arrival, FrameRecord)]
+        last = stamp.read(ring.frame(whole[-1].slot).reshape(480, 640))
     assert last is not None
-    whole = [arrival for arrival in arrivals if arrival.whole]
     ids = [arrival.frame_id for arrival in whole]
     assert ids == sorted(set(ids))
     assert ids[-1] - first.frame_id > len(ids)
@@ -346,4 +347,4 @@ def test_closing_an_unplugged_camera_is_quick_and_silent() -> None:
         hill.restart("K1")
         with opened(camera, ring) as again:
             again.start()
-            assert all(arrival.whole for arrival in collect(again, ring, 3))
+            assert all(isinstance(arrival, FrameRecord) for arrival in collect(again, ring, 3))

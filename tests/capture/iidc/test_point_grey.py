@@ -11,6 +11,7 @@ from capture.iidc.bus import Bus
 from capture.iidc.camera import IidcCamera
 from capture.iidc.device import Device
 from rig.errors import CameraError
+from rig.frame import FrameRecord
 from rig.settings.camera import CameraSettings
 from rig.transport.ring import CameraRing
 from simrig.programs.simulated_hill import SimulatedHill
@@ -19,6 +20,7 @@ from svev.doctor.cameras.firewire_cameras import _look_at_signature
 from tests.capture.iidc.emulated import camera_ring, settings, visible
 from tests.capture.iidc.test_iidc_camera import collect
 from tests.capture.rigs import SCENARIO
+from tests.capture.whole import whole_frames
 
 GUID = "00b09d01011b0001"
 RATE_HZ = 30.0
@@ -53,8 +55,8 @@ def test_frames_are_numbered_and_timed_by_their_first_pixels_and_a_lost_one_is_m
             assert device.read_command(0x830) >> 16 & 0xF == 14
             assert device.absolute_boundaries(423)[0] == pytest.approx(20e-6)  # type: ignore[arg-type]
             assert _look_at_signature(camera, device).code == "check_numbers"
-    arrivals = [*first, *later]
-    assert all(arrival.whole and arrival.trigger_count == -1 for arrival in arrivals)
+    arrivals = whole_frames([*first, *later])
+    assert all(arrival.trigger_count == -1 for arrival in arrivals)
     stamped = arrivals[0].stamped
     assert stamped is not None
     assert (stamped.row, stamped.column, stamped.count) == (0, 0, 8)
@@ -68,7 +70,7 @@ def test_frames_are_numbered_and_timed_by_their_first_pixels_and_a_lost_one_is_m
 def test_information_that_is_not_wanted_is_switched_off() -> None:
     with _running(_settings(iidc={"signature": False})) as (_, made, ring):
         assert "no signature" in made.description
-        assert all(arrival.stamped is None for arrival in collect(made, ring, 2))
+        assert all(arrival.stamped is None for arrival in whole_frames(collect(made, ring, 2)))
 
 
 def test_a_region_is_read_in_another_mode_of_format7() -> None:
@@ -76,7 +78,7 @@ def test_a_region_is_read_in_another_mode_of_format7() -> None:
     with _running(camera) as (_, made, ring):
         assert made.limits is not None
         assert made.limits.width == 1032
-        assert all(arrival.whole for arrival in collect(made, ring, 3))
+        assert all(isinstance(arrival, FrameRecord) for arrival in collect(made, ring, 3))
         with Bus() as bus, Device(bus, bus.find(int(GUID, 16))) as device:
             assert device.mode() == 89
 

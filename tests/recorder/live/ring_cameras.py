@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
-from rig.clocks import DeviceNs, HostNs
-from rig.frame import Record, RecordKind
+from rig.clocks import ClockLatch, DeviceNs, HostNs
+from rig.frame import ConnectedRecord, FrameRecord, LatchRecord
 from rig.settings.camera import CameraSettings, Region
 from rig.settings.model import RecorderSettings, RigSettings
 from rig.settings.trigger import ExternalTrigger
@@ -45,7 +45,7 @@ class RingCameras:
         self.rings, self.start = rings, start
         self.ids = [0] * len(rings)
         for ring in rings:
-            ring.put(Record(RecordKind.CONNECTED, 1, HostNs(start - 1)))
+            ring.put(ConnectedRecord(HostNs(start - 1)), 1)
         self.latch()
 
     def latch(self, pulse: float = 0) -> None:
@@ -53,7 +53,7 @@ class RingCameras:
         for ring in self.rings:
             for i in range(16):
                 time = HostNs(self.time(pulse) - 16 + i)
-                ring.put(Record(RecordKind.LATCH, 1, time, device_time=DeviceNs(time), value=10_000))
+                ring.put(LatchRecord(ClockLatch(DeviceNs(time), time, 10_000)), 1)
 
     def expose(self, pulse: int, *cameras: int, lose: bool = False) -> None:
         """Queue one frame of each camera with pixels (10 * pulse + camera) % 256; `lose`: the transfer loses it."""
@@ -64,10 +64,8 @@ class RingCameras:
                 continue
             self.rings[camera].frame(slot)[:] = grey(pulse, camera)
             time = self.time(pulse)
-            record = Record(
-                RecordKind.FRAME, 1, HostNs(time + ARRIVES), slot, self.ids[camera], 0, DeviceNs(time + camera)
-            )
-            self.rings[camera].put(record)
+            record = FrameRecord(HostNs(time + ARRIVES), slot, self.ids[camera], 0, DeviceNs(time + camera))
+            self.rings[camera].put(record, 1)
 
     def time(self, pulse: float) -> HostNs:
         """When a pulse fires."""

@@ -10,14 +10,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.clocks import HostNs
+from rig.clocks import DeviceNs, HostNs
 from rig.errors import BadInputError
-from rig.frame import NO_SLOT, Record, RecordKind
+from rig.frame import FrameRecord
 from rig.transport.ring import CameraRing
 
 
-def _record(slot: int = NO_SLOT, frame_id: int = 0) -> Record:
-    return Record(RecordKind.FRAME, 1, HostNs(5), slot=slot, frame_id=frame_id)
+def _record(slot: int = 0, frame_id: int = 0) -> FrameRecord:
+    return FrameRecord(HostNs(5), slot, frame_id, 0, DeviceNs(0), epoch=1)
+
+
+def _ids(ring: CameraRing) -> list[int]:
+    """Ids of the frames that are queued; there are no other records."""
+    records = list(iter(ring.get, None))
+    frames = [record for record in records if isinstance(record, FrameRecord)]
+    assert len(frames) == len(records)
+    return [frame.frame_id for frame in frames]
 
 
 @pytest.fixture
@@ -30,16 +38,16 @@ def ring() -> Iterator[CameraRing]:
 def test_lowest_free_slot_is_taken_first(ring: CameraRing) -> None:
     assert [ring.take_slot() for _ in range(5)] == [0, 1, 2, 3, None]
     for slot in (3, 1):
-        ring.put(_record(slot))
+        ring.put(_record(slot), 1)
         ring.release(slot)
     assert ring.take_slot() == 1
 
 
 def test_records_come_in_order_and_a_full_queue_is_counted(ring: CameraRing) -> None:
-    assert [ring.put(_record(frame_id=i)) for i in range(9)] == [True] * 8 + [False]
+    assert [ring.put(_record(frame_id=i), 1) for i in range(9)] == [True] * 8 + [False]
     assert ring.counters()["queue_overflows"] == 1
-    assert [record.frame_id for record in iter(ring.get, None)] == list(range(8))
-    assert ring.put(_record(frame_id=99))
+    assert _ids(ring) == list(range(8))
+    assert ring.put(_record(frame_id=99), 1)
     assert ring.get() == _record(frame_id=99)
 
 
@@ -50,11 +58,11 @@ def test_any_interleaving_keeps_order_and_loses_nothing(puts: list[bool]) -> Non
     got: list[int] = []
     for number, is_put in enumerate(puts):
         if is_put:
-            if ring.put(_record(frame_id=number)):
+            if ring.put(_record(frame_id=number), 1):
                 sent.append(number)
-        elif (record := ring.get()) is not None:
+        elif isinstance(record := ring.get(), FrameRecord):
             got.append(record.frame_id)
-    got += [record.frame_id for record in iter(ring.get, None)]
+    got += _ids(ring)
     ring.close()
     assert got == sent
 
@@ -62,7 +70,7 @@ def test_any_interleaving_keeps_order_and_loses_nothing(puts: list[bool]) -> Non
 def test_a_new_grabber_takes_over_what_the_dead_one_held_but_not_what_is_queued(ring: CameraRing) -> None:
     queued, held = ring.take_slot(), ring.take_slot()
     assert (queued, held) == (0, 1)
-    ring.put(_record(0))
+    ring.put(_record(0), 1)
     ring.reclaim()
     assert ring.take_slot() == 1
     assert ring.counters()["slots_queued"] == 1
@@ -76,7 +84,7 @@ from tests.rig.transport.test_ring import _record
 ring = CameraRing({ring.fd})
 slot = ring.take_slot()
 ring.frame(slot)[:] = 7
-ring.put(_record(slot, 42))
+ring.put(_record(slot, 42), 1)
 """
     subprocess.run([sys.executable, "-c", program], pass_fds=(ring.fd,), check=True, timeout=20)
     record = ring.get()

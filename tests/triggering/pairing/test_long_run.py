@@ -8,7 +8,7 @@ import pytest
 
 from capture.clock_reading import ClockReading
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
-from rig.frame import FrameStatus, Record, RecordKind
+from rig.frame import FrameRecord, FrameStatus
 from triggering.pairing.pairer import ClosedPulse, Pairer
 
 pytestmark = pytest.mark.long
@@ -53,7 +53,7 @@ class Hours:
         if fate is FrameStatus.OK:
             device = device_time(camera, time + int(self.rng.random() * 60_000))
             host = HostNs(time + 35 * MS)
-            self.pairer.frame(camera, Record(RecordKind.FRAME, 1, host, pulse, self.ids[camera], 65535, device))
+            self.pairer.frame(camera, FrameRecord(host, pulse, self.ids[camera], 65535, device, epoch=1))
             if self.readings[camera].is_due(host, device):
                 self.latch(camera, host)
                 self.readings[camera].done(host)

@@ -6,7 +6,7 @@ import pytest
 
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs
 from rig.errors import BadInputError
-from rig.frame import Record, RecordKind
+from rig.frame import DamagedRecord, FrameRecord
 from tests.triggering.feed import HOLD, PERIOD, START, Feed
 from tests.triggering.oracle import ABSENT, DAMAGED, LOST, MISSED, OK
 from tests.triggering.simulation import MS, US
@@ -114,7 +114,7 @@ def test_a_damaged_frame_that_tells_its_trigger_time_is_placed_by_it(damaged_pul
     trigger = feed.time_of(damaged_pulse)
     arrival = HostNs(feed.time_of(2) + late_by)
     device = DeviceNs(trigger - START + 100 * US)
-    feed.pairer.damaged(1, Record(RecordKind.DAMAGED, 1, arrival, device_time=device, value=1))
+    feed.pairer.damaged(1, DamagedRecord(arrival, device, epoch=1))
     feed.all_cameras(3, [4, 4, 4])
     statuses = [pulse.outcomes[1].status for pulse in feed.closed[1:3]]
     assert statuses == ([DAMAGED, LOST] if damaged_pulse == 1 else [LOST, DAMAGED])
@@ -168,7 +168,7 @@ def test_a_damaged_arrival_outweighs_a_wrong_presumption() -> None:
     feed = running_train()
     feed.all_cameras(10, [11, None, 11])
     feed.advance(feed.time_of(30))
-    feed.pairer.damaged(1, Record(RecordKind.DAMAGED, 1, HostNs(feed.time_of(31) + 5 * MS)))
+    feed.pairer.damaged(1, DamagedRecord(HostNs(feed.time_of(31) + 5 * MS), epoch=1))
     feed.all_cameras(31, [12, None, 12])
     feed.all_cameras(32, [13, 12, 13])
     assert [tag.outcomes[1].status for tag in feed.closed[9:]] == [OK, LOST, DAMAGED, OK]
@@ -274,7 +274,7 @@ def test_records_of_an_epoch_that_is_over_are_dropped() -> None:
     feed.pairer.disconnected(0, feed.time_of(0.3))
     feed.pairer.connected(0, 2, feed.time_of(0.4))
     assert not feed.frame(0, 1, 2, epoch=1)
-    feed.pairer.damaged(0, Record(RecordKind.DAMAGED, 1, feed.time_of(1.5)))
+    feed.pairer.damaged(0, DamagedRecord(feed.time_of(1.5), epoch=1))
     assert feed.pairer.counters[0].stale == 2
 
 
@@ -305,7 +305,7 @@ def test_frames_still_queued_when_their_grabber_is_given_up_are_placed() -> None
 def test_damaged_frames_before_a_disconnection_keep_their_cause() -> None:
     feed = Feed()
     feed.all_cameras(0, [1, 1, 1])
-    feed.pairer.damaged(0, Record(RecordKind.DAMAGED, 1, HostNs(feed.time_of(1) + 25 * MS)))
+    feed.pairer.damaged(0, DamagedRecord(HostNs(feed.time_of(1) + 25 * MS), epoch=1))
     feed.all_cameras(1, [None, 2, 2])
     feed.pairer.disconnected(0, feed.time_of(2.5))
     feed.all_cameras(2, [None, 3, 3])
@@ -316,7 +316,7 @@ def test_a_camera_that_was_never_there_is_absent_and_not_waited_for() -> None:
     pairer = Pairer(2, PERIOD, hold_ns=4 * PERIOD)
     pairer.connected(0, 1, START)
     pairer.latch(0, ClockLatch(DeviceNs(0), START, 50 * US))
-    record = Record(RecordKind.FRAME, 1, HostNs(START + 30 * MS), 0, 1, 0, DeviceNs(20 * MS))
+    record = FrameRecord(HostNs(START + 30 * MS), 0, 1, 0, DeviceNs(20 * MS), epoch=1)
     assert pairer.frame(0, record) is not None
     (tag,) = pairer.advance(HostNs(START + 30 * MS))
     assert [outcome.status for outcome in tag.outcomes] == [OK, ABSENT]

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.clocks import NS_PER_S, HostNs
-from rig.frame import FrameStatus, Record, RecordKind
+from rig.frame import DamagedRecord, FrameStatus
 from tests.triggering.feed import HOLD, PERIOD, Feed
 from tests.triggering.oracle import ABSENT, DAMAGED, LOST, OK, check, check_no_pulse_is_mixed
 from tests.triggering.pairing.test_records import running_train
@@ -65,7 +65,7 @@ def test_one_camera_that_is_there_shows_that_the_train_paused() -> None:
 def test_a_frame_that_was_cut_off_with_its_camera_stops_no_train(late_ms: int) -> None:
     """Power goes while a frame is being sent: what comes of it, soon or when the rest is given up, is damaged."""
     feed = running_train(20)
-    feed.pairer.damaged(2, Record(RecordKind.DAMAGED, 1, HostNs(feed.time_of(20) + late_ms * MS)))
+    feed.pairer.damaged(2, DamagedRecord(HostNs(feed.time_of(20) + late_ms * MS), epoch=1))
     all_gone(feed, 25)
     feed.advance(feed.time_of(60) + HOLD + MS)
     assert len(feed.closed) == 61

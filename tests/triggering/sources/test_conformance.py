@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 from capture.clock_reading import ClockReading
 from rig.api.trigger import TriggerControl
 from rig.clocks import ClockLatch, DeviceNs, HostNs
-from rig.frame import Record, RecordKind
+from rig.frame import FrameRecord
 from rig.settings.trigger import Trigger
 from triggering.pairing.pairer import ClosedPulse, Pairer
 from triggering.sources.choice import trigger_source
@@ -153,7 +153,7 @@ class _Feed:
         """A frame exposed at `time` comes 10 ms later."""
         self._ids[camera] += 1
         host, device = HostNs(time + 10 * MS), DeviceNs(time)
-        record = Record(RecordKind.FRAME, 1, host, slot=pulse, frame_id=self._ids[camera], device_time=device)
+        record = FrameRecord(host, pulse, self._ids[camera], 0, device, epoch=1)
         self._pairer.frame(camera, record)
         if self._readings[camera].is_due(host, device):
             self._latch(camera, host)

@@ -1,9 +1,9 @@
 """What the ids and the trigger counts of two frames of a camera say of what came between them."""
 
-from rig.frame import Record
+from rig.frame import FrameRecord
 
 
-def overruns_between(last: Record, record: Record, frames: int) -> int:
+def overruns_between(last: FrameRecord, record: FrameRecord, frames: int) -> int:
     """Triggers between two whole frames at which the camera took no frame, when it took `frames` in all."""
     if record.trigger_count < 0 or last.trigger_count < 0:
         return 0

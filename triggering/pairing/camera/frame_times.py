@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from enum import Enum
 
 from rig.clocks import ClockLatch, DeviceNs, HostNs
-from rig.frame import Record
+from rig.frame import FrameRecord
 from triggering.pairing.camera.arrivals import Arrivals
 from triggering.pairing.camera.frame_ids import id_step
 from triggering.pairing.camera.plausibility import Others, Plausibility, Timed, Verdict
@@ -76,7 +76,7 @@ class FrameTimes:
         """When the exposure of a frame began on the common time line, by its device time."""
         return HostNs(self.clock.to_host(device) - self.stamping.late_ns)
 
-    def locate(self, record: Record, *, first: bool) -> HostNs | Unusable:
+    def locate(self, record: FrameRecord, *, first: bool) -> HostNs | Unusable:
         """Trigger time of a whole frame on the common time line, or why the frame cannot be used.
 
         Args:
@@ -97,7 +97,7 @@ class FrameTimes:
         return Unusable.UNSETTLED if self.stamping.contradicts(time, arrival, 2 * uncertainty_ns) else time
 
     def judge(
-        self, last: tuple[Record, HostNs] | None, waiting: Sequence[Record], others: Others, *, final: bool
+        self, last: tuple[FrameRecord, HostNs] | None, waiting: Sequence[FrameRecord], others: Others, *, final: bool
     ) -> Verdict:
         """Judge the first of the whole frames that wait.
 
@@ -116,7 +116,9 @@ class FrameTimes:
             before = record
         return self.plausibility.judge(last_time, timed, read=self._is_read(waiting[0]), others=others, final=final)
 
-    def judge_new(self, last: tuple[Record, HostNs] | None, record: Record, time: HostNs, others: Others) -> Verdict:
+    def judge_new(
+        self, last: tuple[FrameRecord, HostNs] | None, record: FrameRecord, time: HostNs, others: Others
+    ) -> Verdict:
         """As `judge`, for a frame that has just come, while none waits.
 
         Args:
@@ -131,7 +133,7 @@ class FrameTimes:
         timed = (_timed(before, record, time),)
         return self.plausibility.judge(last_time, timed, read=self._is_read(record), others=others)
 
-    def _is_read(self, record: Record) -> bool:
+    def _is_read(self, record: FrameRecord) -> bool:
         """Whether the clock has been read after a frame, and goes on as it did."""
         read = self._confirmed
         return read is not None and record.host_time <= read.host and record.device_time <= read.device
@@ -145,12 +147,12 @@ class FrameTimes:
         return self.plausibility.doubted == 0 and self.clock.start_anew(self._train.tolerance_ns)
 
 
-def _is_same(before: Record, record: Record) -> bool:
+def _is_same(before: FrameRecord, record: FrameRecord) -> bool:
     """Whether a frame came twice; `CameraTrack.follow` counts it."""
     return record.frame_id == before.frame_id and record.device_time == before.device_time
 
 
-def _timed(before: Record | None, record: Record, time: HostNs) -> Timed:
+def _timed(before: FrameRecord | None, record: FrameRecord, time: HostNs) -> Timed:
     """A frame, triggered at `time`, with its step from the frame before."""
     step = None if before is None else id_step(before.frame_id, record.frame_id, record.id_modulus)
     return Timed(step, time, record.host_time)

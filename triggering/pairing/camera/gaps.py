@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from rig.clocks import HostNs
-from rig.frame import FrameStatus, Record
+from rig.frame import FrameRecord, FrameStatus
 from rig.health import CameraCounters
 from triggering.pairing.camera.frame_ids import id_step, overruns_between
 from triggering.pairing.outcomes import NO_FRAME, OVERRUN, Outcome
@@ -174,7 +174,7 @@ class Gaps:
             self._counters.unassigned += 1
         self._damaged.append(host)
 
-    def first_frame(self, since: HostNs, record: Record, time: HostNs) -> None:
+    def first_frame(self, since: HostNs, record: FrameRecord, time: HostNs) -> None:
         """End the running gap, which began with the connection at `since`, by the first whole frame, taken at `time`.
 
         The id of the frame counts the frames before it, if the ids may have begun at 1.
@@ -184,7 +184,7 @@ class Gaps:
             self.broken, taken = True, 0
         self._end_running(since, time, taken, anchored=False)
 
-    def next_frame(self, last: Record, last_time: HostNs, record: Record, time: HostNs) -> None:
+    def next_frame(self, last: FrameRecord, last_time: HostNs, record: FrameRecord, time: HostNs) -> None:
         """End the running gap, from the frame `last` at `last_time` to the whole frame `record` at `time`."""
         step = id_step(last.frame_id, record.frame_id, record.id_modulus)
         if not 0 < step <= self._most_steps(time - last_time):

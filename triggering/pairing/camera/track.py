@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rig.clocks import ClockLatch, DeviceNs, HostNs
-from rig.frame import FrameStatus, Record
+from rig.frame import DamagedRecord, FrameRecord, FrameStatus
 from rig.health import CameraCounters
 from triggering.pairing.camera.activity import HELD_BACK_NS, Activity
 from triggering.pairing.camera.frame_times import FrameTimes, Unusable
@@ -35,7 +35,7 @@ class CameraTrack:
         self.presence, self.activity = Presence(train), Activity()
         self.times = FrameTimes(train, exposure_ns)
         self.gaps = Gaps(train, self.counters)
-        self._last: tuple[Record, HostNs] | None = None  # the epoch's last whole frame and its trigger time
+        self._last: tuple[FrameRecord, HostNs] | None = None  # the epoch's last whole frame and its trigger time
 
     @property
     def latency_ns(self) -> float:
@@ -113,11 +113,11 @@ class CameraTrack:
         self.activity.alive = max(self.activity.alive, HostNs(round(matcher.trigger_of(host))))
         self._stir()
 
-    def note_damage(self, record: Record) -> None:
+    def note_damage(self, record: DamagedRecord) -> None:
         """Enter the record of a damaged arrival, of which only the times are used."""
-        self.damaged(record.host_time, record.device_time if record.value == 1 else None)
+        self.damaged(record.host_time, record.device_time)
 
-    def trigger_time(self, record: Record) -> HostNs | None:
+    def trigger_time(self, record: FrameRecord) -> HostNs | None:
         """Trigger time of a whole frame on the common time line; None if the frame cannot be used."""
         time = self.times.locate(record, first=self._last is None)
         if not isinstance(time, Unusable):
@@ -125,13 +125,13 @@ class CameraTrack:
         if time is Unusable.CLOCK_UNKNOWN:
             self.counters.unanchored += 1
             self.gaps.broken = self.gaps.broken or self._last is None  # later ids do not count from the beginning
-        elif time is Unusable.REJECTED:
-            self.reject(record)
-        else:
-            self.refuse(record)
+            return None
+        if time is Unusable.REJECTED:
+            self.doubt()
+        self.refuse(record)
         return None
 
-    def judge(self, waiting: Sequence[Record], others: Others, *, final: bool = False) -> Verdict:
+    def judge(self, waiting: Sequence[FrameRecord], others: Others, *, final: bool = False) -> Verdict:
         """Judge the first of the whole frames that wait, by all that is known.
 
         Args:
@@ -141,26 +141,25 @@ class CameraTrack:
         """
         return self.times.judge(self._last, waiting, others, final=final)
 
-    def judge_new(self, record: Record, time: HostNs, others: Others) -> Verdict:
+    def judge_new(self, record: FrameRecord, time: HostNs, others: Others) -> Verdict:
         """As `judge`, for a frame that has just come, triggered at `time`, while none waits."""
         return self.times.judge_new(self._last, record, time, others)
 
-    def reject(self, record: Record) -> None:
-        """Refuse a frame whose time is contradicted, and doubt the camera from now on."""
+    def doubt(self) -> None:
+        """Doubt the camera from now on: the time of a frame is contradicted."""
         self.times.plausibility.doubted += 1
-        self.refuse(record)
 
-    def refuse(self, record: Record) -> None:
+    def refuse(self, record: FrameRecord) -> None:
         """Treat a whole frame as damaged: its trigger time is not known."""
         self.counters.implausible += 1
         self.damaged(record.host_time)
 
-    def waits(self, record: Record) -> None:
+    def waits(self, record: FrameRecord) -> None:
         """Note that a whole frame has come that is not accepted yet: the camera is neither silent nor overdue."""
         self.activity.heard = record.host_time
         self._stir()
 
-    def follow(self, record: Record, time: HostNs) -> bool:
+    def follow(self, record: FrameRecord, time: HostNs) -> bool:
         """Enter an accepted frame, triggered at `time`: its id tells what happened since the last one.
 
         Returns:

@@ -24,6 +24,7 @@ from svev import cli
 from tests.analysis.scene.hill import training, training_detections, training_images
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
+from tests.support.message_index import anchor, index, messages, shown
 from tests.support.rigs import write_rig
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -60,21 +61,17 @@ def _name(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
-def _anchor(heading: str) -> str:
-    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
-
-
 @pytest.mark.parametrize("page", PAGES, ids=_name)
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)]+)\)", page.read_text()):
         if target.startswith("https://"):
             continue
-        path, _, anchor = target.partition("#")
+        path, _, place = target.partition("#")
         there = (page.parent / path).resolve() if path else page
         assert there.exists(), target
-        if anchor:
+        if place:
             headings = re.findall(r"^#+ (.*)$", there.read_text(), re.MULTILINE)
-            assert anchor in {_anchor(heading) for heading in headings}, target
+            assert place in {anchor(heading) for heading in headings}, target
 
 
 @pytest.mark.parametrize("drawing", sorted(ROOT.glob("docs/images/*.svg")), ids=_name)
@@ -91,7 +88,7 @@ def test_drawings_are_for_light_and_dark_and_fetch_nothing(drawing: Path) -> Non
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)
 def test_commands_and_targets_exist(page: Path) -> None:
-    text = re.sub(r"^### .*$", "", page.read_text(), flags=re.MULTILINE)  # headings may quote error messages
+    text = re.sub(r"^(### |- \[`).*$", "", page.read_text(), flags=re.MULTILINE)  # headings and index quote messages
     code = " ; ".join([*re.findall(r"`([^`\n]+)`", text), *(body for _, body in FENCE.findall(text))])
     group = typer.main.get_command(cli.command_line())
     assert isinstance(group, TyperGroup)
@@ -131,14 +128,12 @@ def _messages() -> list[str]:
 
 
 def test_troubleshooting_quotes_the_code() -> None:
-    text = (ROOT / "docs" / "how-to" / "troubleshooting.md").read_text()
-    quoted = re.findall(r"^### `(.*)`$", text, re.MULTILINE)
-    assert len(quoted) > 20
-    messages = _messages()
-    for words in quoted:
+    said = _messages()
+    assert len(messages()) > 200
+    for words, _ in messages():
         pieces = [re.escape(piece.strip()) for piece in words.split("…") if piece.strip()]
         pattern = re.compile(".*".join(pieces), re.DOTALL)
-        assert any(pattern.search(message) for message in messages), words
+        assert any(pattern.search(message) for message in said), words
 
 
 @pytest.mark.parametrize("page", DECISIONS, ids=_name)
@@ -163,6 +158,10 @@ def test_every_page_is_on_the_way_from_the_door() -> None:
         links = re.findall(r"\]\(([^)#]+\.md)", page.read_text())
         ahead += [(page.parent / link).resolve() for link in links if not link.startswith("https://")]
     assert set(PAGES) <= known
+
+
+def test_the_index_of_messages_has_every_heading() -> None:
+    assert shown() == index(), "run: python -m tests.support.message_index"
 
 
 def test_the_survey_of_the_page_on_measuring_fits_the_simulated_hill(tmp_path: Path) -> None:

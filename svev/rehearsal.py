@@ -223,7 +223,7 @@ def judge_pulses(rig: RigSettings, alarms: list[str], report: VerifyReport) -> I
         yield warning(Topic.CAMERAS, "check_rehearsed_without", what, remedy, said=said, missing=missing)
     else:
         what = "{said}: {missing}"
-        remedy = "see docs/how-to/troubleshooting.md, pulses that are not complete, for what the causes point at"
+        remedy = "see docs/how-to/troubleshooting/pulses.md for what the causes point at"
         missing = ledger.summary_line().partition(", ")[2]
         yield failure(Topic.CAMERAS, "check_rehearsed_partly", what, remedy, said=said, missing=missing)
     for alarm in alarms:

@@ -144,7 +144,7 @@ export const findings = {
 
   check_rehearsed: ["{pulses} pulser tatt opp, {complete} fullstendige"],
   check_rehearsed_without: ["{said}: uten {missing}", "sjekk strøm og kabel"],
-  check_rehearsed_partly: ["{said}: {missing}", "se docs/how-to/troubleshooting.md om pulser som ikke er fullstendige, for hva årsakene peker på"],
+  check_rehearsed_partly: ["{said}: {missing}", "se docs/how-to/troubleshooting/pulses.md for hva årsakene peker på"],
   check_rehearsed_alarm: ["klokker, trigger eller takt stemmer ikke: {why}", "rett det, og prøv på nytt"],
   check_read_back: ["{mb} MB lest tilbake og kontrollert"],
   check_not_read_back: ["det som ble skrevet, kan ikke leses tilbake: {why}", "se i `dmesg`, ta opp på en annen disk"],

@@ -164,6 +164,24 @@ def test_the_index_of_messages_has_every_heading() -> None:
     assert shown() == index(), "run: python -m tests.support.message_index"
 
 
+def test_no_sentence_must_be_read_twice() -> None:
+    """None has three relative pronouns: a noun says it in fewer words."""
+    found = []
+    for page in PAGES:
+        if page.parent == ROOT:
+            continue
+        text = re.sub(r"```.*?```|^(?:\||#|<!--|- \[`).*?$", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+        text = re.sub(r"`[^`]*`|\]\([^)]*\)", "", text)
+        paragraphs = re.split(r"\n\s*\n|\n\s*(?:-|\d+\.) ", text)
+        sentences = [each for paragraph in paragraphs for each in re.split(r"[.:;!?]\s", paragraph)]
+        found += [
+            f"{_name(page)}: {' '.join(each.split())}"
+            for each in sentences
+            if len(re.findall(r"\b(?:which|that|what|who|whose|whom)\b", each)) > 2
+        ]
+    assert not found, "\n".join(found)
+
+
 def test_the_survey_of_the_page_on_measuring_fits_the_simulated_hill(tmp_path: Path) -> None:
     (example,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "how-to" / "measuring.md").read_text(), re.DOTALL)
     path = tmp_path / "survey.json"

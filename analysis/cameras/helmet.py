@@ -20,7 +20,7 @@ from photogrammetry.network.model import ImageObservations, Network, Point, Role
 from photogrammetry.procedures.orientation import Orientation, orient
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.phrase import phrase, plain
+from rig.phrase import phrase
 
 HELMET = "P1"
 _MOVING = "H*"  # names of the helmet's places
@@ -56,7 +56,7 @@ def with_helmet(
     orientation = orient(network, alternative=2, moving=_MOVING, uncertain_interior=True)
     text = "{count} places of the helmet tie the images beside the balls"
     notes = [phrase("scene_helmet", text, count=len(places))]
-    found = [plain(finding.message) for stage in orientation.stages for finding in stage.findings]
+    found = [finding.said for stage in orientation.stages for finding in stage.findings]
     notes += [message for message in found if message not in scene.messages]
     again = scene_of_survey(scene_of(network, orientation, scene.static, {}, (*scene.messages, *notes)), scene.given)
     return replace(again, balls={n: ball for n, ball in again.balls.items() if n in scene.balls}), orientation

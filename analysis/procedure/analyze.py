@@ -24,7 +24,7 @@ from analysis.scene.camera_system import CameraSystem
 from analysis.scene.static_image import StaticImage, static_images
 from photogrammetry.procedures.orientation import Orientation
 from rig.errors import NoJumpError
-from rig.phrase import phrase, plain
+from rig.phrase import Phrase, phrase
 
 _NAMED = 6  # pulses that a message names, at most
 #: Told with the step that is done, in words, and the share of it that is done, 0 to 1.
@@ -125,7 +125,7 @@ def analyze(
     scene, orientation, steadiness = found.scene, found.orientation, found.steadiness
     tell("looking at the balls", 1.0)
     jumps: list[JumpMeasurements] = []
-    unread: list[str] = []
+    unread: list[Phrase] = []
     if images:
         seen = seen or look(log, {name: scene.static[name] for name in scene.system.names}, tell)
         unread = unread_pulses(seen.candidates)
@@ -154,7 +154,7 @@ def analyze(
         facts.recording,
         facts.session,
         facts.rate_hz,
-        orientation_result(scene, steadiness.moved, (*map(plain, (*facts.messages, *unread)), *steadiness.messages)),
+        orientation_result(scene, steadiness.moved, (*facts.messages, *unread, *steadiness.messages)),
         _synchrony(computed),
         tuple(each.jump for each in computed),
     )
@@ -163,16 +163,15 @@ def analyze(
     return Analysis(result, measurements, scene, orientation, perpendicular, standings)
 
 
-def unread_pulses(candidates: Sequence[PulseCandidates]) -> list[str]:
-    """A line for people if pulses of the log are missing between others."""
+def unread_pulses(candidates: Sequence[PulseCandidates]) -> list[Phrase]:
+    """What to say if pulses of the log are missing between others."""
     numbers = [seen.pulse for seen in candidates]
     missing = sorted(set(range(min(numbers), max(numbers) + 1)) - set(numbers)) if numbers else []
     if not missing:
         return []
     which = ", ".join(map(str, missing[:_NAMED])) + (", ..." if len(missing) > _NAMED else "")
-    return [
-        f"pulse{'s' * (len(missing) > 1)} {which} cannot be read from the log: it is damaged; svev verify says more"
-    ]
+    text = "cannot be read from the log, which is damaged: pulses {which}; svev verify says more"
+    return [phrase("log_unread", text, which=which)]
 
 
 def _flights(measurements: Measurements, steadiness: Steadiness) -> tuple[dict[int, Standing], list[SteadiedJump]]:

@@ -10,7 +10,7 @@ from analysis.measurements.model import MeasuredCamera
 from recorder.reading.info import LogInfo, imported_in_words, info
 from recorder.reading.log_reader import LogReader
 from rig.errors import BadInputError
-from rig.phrase import Phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.camera import CameraSettings
 from rig.settings.region import calibration_unfit
 from rig.settings.strict_toml import examine
@@ -30,7 +30,7 @@ class LogFacts:
         rate_hz: pulses per second.
         columns: first and one past the last column of each camera's block, by name, left to right.
         cameras: image size and exposure time by name.
-        messages: what a person should know, one line each.
+        messages: what a person should know.
     """
 
     path: Path
@@ -39,7 +39,7 @@ class LogFacts:
     rate_hz: float
     columns: Mapping[str, tuple[int, int]]
     cameras: Mapping[str, MeasuredCamera]
-    messages: tuple[str, ...]
+    messages: tuple[Phrase, ...]
 
 
 def log_facts(path: Path) -> LogFacts:
@@ -50,28 +50,31 @@ def log_facts(path: Path) -> LogFacts:
     """
     about = info(path)
     if about.first is None:
-        raise BadInputError(f"{path}: holds no pulse, so there is nothing to analyze; choose another recording")
+        text = "{log}: holds no pulse, so there is nothing to analyze; choose another recording"
+        raise BadInputError(phrase("log_no_pulse", text, log=str(path)))
     settings = _cameras(path)
     # The rig file of films without one is made by the import, which knows no exposure times.
     told = [camera for camera in settings if "exposure_us" in camera or not about.imported]
     exposures = {str(camera.get("name")): _exposure_us(camera) for camera in told}
     tags = about.first.cameras
     unknown = [tag.name for tag in tags if tag.name not in exposures]
-    messages = [f"exposure time of {', '.join(unknown)} is unknown: taken as {_EXPOSURE_US:g} us"] if unknown else []
-    messages += [str(unfit) for camera in settings if (unfit := _unfit(camera)) is not None]
+    messages = []
+    if unknown:
+        text = "exposure time of {cameras} is unknown: taken as {us} us"
+        messages.append(phrase("log_exposure", text, cameras=", ".join(unknown), us=_EXPOSURE_US))
+    messages += [unfit for camera in settings if (unfit := _unfit(camera)) is not None]
     if about.imported:
-        messages.append(
-            f"{imported_in_words(about.imported)}. How late each camera is, is only known from the jumper's own motion"
-        )
+        text = "{imported}. How late each camera is, is only known from the jumper's own motion"
+        messages.append(phrase("log_imported", text, imported=imported_in_words(about.imported)))
     if about.truncated or not about.closed:
-        messages.append(
-            "the log was cut off or not closed: what can be read is measured; svev recover makes a whole one"
-        )
+        text = "the log was cut off or not closed: what can be read is measured; svev recover makes a whole one"
+        messages.append(phrase("log_cut_off", text))
     if about.first.pixels.is_mosaic:
-        messages.append(
+        text = (
             "the cameras have colour filters: grey values are interpolated from neighbours, which softens edges; the "
             "sigmas of ski angles, the roll above all, are too small"
         )
+        messages.append(phrase("log_mosaic", text))
     shape = about.first.shape
     cameras = {tag.name: MeasuredCamera(tag.size(shape), exposures.get(tag.name, _EXPOSURE_US) / 1e6) for tag in tags}
     columns = {tag.name: (int(tag.columns[0]), int(tag.columns[1])) for tag in tags}
@@ -85,9 +88,8 @@ def _rate_hz(about: LogInfo) -> float:
     try:
         return float(about.rig["rate_hz"])
     except (KeyError, ValueError):
-        raise BadInputError(
-            f"{about.path}: has one pulse and does not say its rate; a jump needs many pulses: choose another recording"
-        ) from None
+        text = "{log}: has one pulse and does not say its rate; a jump needs many pulses: choose another recording"
+        raise BadInputError(phrase("log_one_pulse", text, log=str(about.path))) from None
 
 
 def _cameras(path: Path) -> list[dict[str, Any]]:

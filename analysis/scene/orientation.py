@@ -26,7 +26,7 @@ from photogrammetry.network.model import Camera, Image, Network, Role
 from photogrammetry.procedures.orientation import Orientation, orient
 from rig.arrays import Floats
 from rig.errors import BadInputError
-from rig.phrase import Phrase, phrase, plain
+from rig.phrase import Phrase, phrase
 from rig.phrases import in_turn
 
 _FEWEST_CAMERAS = 2
@@ -161,7 +161,7 @@ def orient_images(
     network = with_scatter(lit.network, orient(lit.network, uncertain_interior=True))
     orientation = orient(network, uncertain_interior=True)
     if len(orientation.outcome.adjustment.network.images) < _FEWEST_CAMERAS:
-        raise BadInputError("; ".join(orientation.left_out))
+        raise BadInputError(in_turn(orientation.left_out))
     failures = strange | failures
     messages = [
         phrase("scene_not_oriented", "camera {camera} is not oriented: {why}", camera=name, why=reason)
@@ -172,8 +172,8 @@ def orient_images(
         phrase("scene_no_image", "camera {camera} of the survey has no image in the log", camera=name)
         for name in missing
     ]
-    messages += [*notes, *map(plain, orientation.left_out), *_misfit(orientation), *lit.messages]
-    messages += [plain(finding.message) for stage in orientation.stages for finding in stage.findings]
+    messages += [*notes, *orientation.left_out, *_misfit(orientation), *lit.messages]
+    messages += [finding.said for stage in orientation.stages for finding in stage.findings]
     return scene_of(network, orientation, static, failures, messages)
 
 

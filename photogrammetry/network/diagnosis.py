@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from rig.errors import SvevError
+from rig.phrase import Phrase
+from rig.phrases import in_turn
 
 
 class DefectKind(StrEnum):
@@ -22,16 +24,21 @@ class Defect:
     Attributes:
         kind: what is undetermined.
         defect: how many unknowns (or combinations of them) stay undetermined; 0 where that is not known.
-        message: in words, ending in what to do.
+        said: in words, ending in what to do.
         points: names of the points concerned.
         images: names of the images concerned.
     """
 
     kind: DefectKind
     defect: int
-    message: str
+    said: Phrase
     points: tuple[str, ...] = ()
     images: tuple[str, ...] = ()
+
+    @property
+    def message(self) -> str:
+        """The same in English."""
+        return self.said.text
 
 
 class NotSolvableError(SvevError):
@@ -40,7 +47,7 @@ class NotSolvableError(SvevError):
     exit_code = 3
 
     def __init__(self, defects: tuple[Defect, ...]):
-        super().__init__("; ".join(defect.message for defect in defects))
+        super().__init__(in_turn([defect.said for defect in defects]))
         self.defects = defects
 
 

@@ -26,6 +26,7 @@ from photogrammetry.start_values.search import complete
 from photogrammetry.start_values.sightings import reduce_observations
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 _FEWEST: Final = 3  # points of a resection; with so many up to four poses fit exactly
 #: Two images are exchanged if each lies so much nearer to where the other is given than to where itself is given.
@@ -61,12 +62,16 @@ def _undecided(given: Network, a: Adjustment, known: set[str]) -> Iterator[Defec
         if image.name in known or not apart:
             continue
         places, sums = _distinct_places(i, [first, *apart])
-        words = (
-            f"image {image.name} has {len(places)} poses between which the residuals do not decide, because the "
-            f"surveyed points nearly lie in a plane: X0 {' or '.join(places)} with vTPv {' or '.join(sums)}; survey a "
-            "point off that plane, come nearer, or give an approximate pose"
+        text = (
+            "image {image} has {count} poses between which the residuals do not decide, because the surveyed points "
+            "nearly lie in a plane: X0 {places} with vTPv {sums}; survey a point off that plane, come nearer, or give "
+            "an approximate pose"
         )
-        yield Defect(DefectKind.IMAGES, 0, words, images=(image.name,))
+        said = phrase(
+            "defect_two_poses", text, image=image.name, count=len(places), places=" / ".join(places),
+            sums=" / ".join(sums),
+        )  # fmt: skip
+        yield Defect(DefectKind.IMAGES, 0, said, images=(image.name,))
 
 
 def _distinct_places(image: int, found: Sequence[Minimum]) -> tuple[list[str], list[str]]:
@@ -100,13 +105,14 @@ def _ambiguities(a: Adjustment, known: set[str]) -> Iterator[Defect]:
             continue  # two measurements of one point, or points on a line: the rank analysis has judged them
         if found.ambiguous:
             poses = (found.camera, *found.alternatives)
-            places = " or ".join(_place(pose.X0) for pose in poses)
+            places = " / ".join(_place(pose.X0) for pose in poses)
             name = a.network.images[i].name
-            words = (
-                f"image {name} shows three points only, which fit {len(poses)} poses equally: X0 {places}; measure a "
-                "fourth point in it, or give an approximate pose"
+            text = (
+                "image {image} shows three points only, which fit {count} poses equally: X0 {places}; measure a fourth "
+                "point in it, or give an approximate pose"
             )
-            yield Defect(DefectKind.IMAGES, 0, words, images=(name,))
+            said = phrase("defect_three_points", text, image=name, count=len(poses), places=places)
+            yield Defect(DefectKind.IMAGES, 0, said, images=(name,))
 
 
 def refuse_contradicted(given: Network, a: Adjustment) -> None:
@@ -130,20 +136,22 @@ def refuse_contradicted(given: Network, a: Adjustment) -> None:
         straight = np.linalg.norm(one_found - one_given) + np.linalg.norm(other_found - other_given)
         crossed = np.linalg.norm(one_found - other_given) + np.linalg.norm(other_found - one_given)
         if crossed < _NEARER * straight:
-            raise RefusedError(
-                f"images {one} and {other} look exchanged: each was found where the other is given; exchange their "
+            text = (
+                "images {one} and {other} look exchanged: each was found where the other is given; exchange their "
                 "measurements, or their poses if those are wrong"
             )
+            raise RefusedError(phrase("refused_exchanged_poses", text, one=one, other=other))
         apart.append((float(np.linalg.norm(one_found - other_found)), float(np.linalg.norm(one_given - other_given))))
     if len(apart) < _PAIRS or min(length for pair in apart for length in pair) <= 0.0:
         return
     factors = np.array([found / given for found, given in apart])
     factor = float(np.median(factors))
     if np.ptp(np.log(factors)) <= _ALIKE and not 1.0 / _OTHER_UNIT < factor < _OTHER_UNIT:
-        raise RefusedError(
-            f"the images were found {factor:.4g} times as far apart as their given poses are: survey and poses have "
+        text = (
+            "the images were found {factor} times as far apart as their given poses are: survey and poses have "
             "different units; give both in one"
         )
+        raise RefusedError(phrase("refused_units", text, factor=f"{factor:.4g}"))
 
 
 def refuse_exchanged_cameras(alone: Network, ratio: float) -> None:
@@ -163,11 +171,12 @@ def refuse_exchanged_cameras(alone: Network, ratio: float) -> None:
     if not trials:
         return
     least, (one, other) = min(trials)
-    before = f"falls from {ratio:.3g} to {least:.3g}" if np.isfinite(ratio) else f"becomes {least:.3g}"
-    raise RefusedError(
-        f"images {one} and {other} look exchanged: sigma0 {before} times the a priori one once each has the other's "
-        "camera; exchange their measurements or their cameras"
+    text = (
+        "images {one} and {other} look exchanged: once each has the other's camera, sigma0 is {least} times the a "
+        "priori one, and {before} times as they are; exchange their measurements or their cameras"
     )
+    before, found = f"{ratio:.3g}", f"{least:.3g}"
+    raise RefusedError(phrase("refused_exchanged_cameras", text, one=one, other=other, least=found, before=before))
 
 
 def _exchanges(network: Network) -> Iterator[tuple[tuple[str, str], Network]]:

@@ -7,6 +7,8 @@ from typing import Final
 
 from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK
 from photogrammetry.network.model import Role
+from rig.phrase import Phrase, phrase
+from rig.phrases import in_turn
 
 #: Roles of points whose given coordinates the adjustment uses.
 SURVEYED: Final = (Role.CONTROL, Role.FIXED)
@@ -28,12 +30,17 @@ class Finding:
     """A gross error that a stage found.
 
     Attributes:
-        message: names the observation, with its tests.
+        said: names the observation, with its tests.
         removed: whether it was taken out.
     """
 
-    message: str
+    said: Phrase
     removed: bool
+
+    @property
+    def message(self) -> str:
+        """The same in English."""
+        return self.said.text
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +77,15 @@ class Stage:
     tests: tuple[PointTest, ...] = ()
 
 
-def too_many(gone: Sequence[str], count: int) -> str:
+def too_many(gone: Sequence[str], count: int) -> Phrase:
     """The refusal of a survey that would lose more than a third of its `count` points, those in `gone`."""
-    return (
-        f"the survey contradicts the images: {len(gone)} of {count} reference points would have to go "
-        f"({', '.join(gone)}); check their names, coordinates and units, and survey them again"
+    text = (
+        "the survey contradicts the images: {gone} of {count} reference points would have to go ({names}); check their "
+        "names, coordinates and units, and survey them again"
     )
+    return phrase("refused_points", text, gone=len(gone), count=count, names=", ".join(gone))
 
 
-def told_of(findings: Sequence[str]) -> str:
-    """What is known, as the rest of a sentence."""
-    return "".join(f"; {words}" for words in findings[:_TOLD])
+def told_of(refusal: Phrase, findings: Sequence[Phrase]) -> Phrase:
+    """A refusal with what is known."""
+    return in_turn([refusal, *findings[:_TOLD]])

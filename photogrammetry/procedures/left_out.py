@@ -20,6 +20,7 @@ from photogrammetry.network.selection import only_points, rays, sub_network, wit
 from photogrammetry.procedures.findings import SURVEYED
 from photogrammetry.start_values.sightings import reduce_observations
 from rig.arrays import Flags, Floats
+from rig.phrase import Phrase, phrase
 
 #: Errors of an adjustment.
 Failure = NotSolvableError | NotConvergedError | RefusedError
@@ -60,7 +61,8 @@ def naming_unplaced(error: NotConvergedError, network: Network, start: State) ->
     if not found:
         return error
     words = "; ".join(f"{name} {why}" for name, why in found.items())
-    return NotConvergedError(f"{error}; tie points without a place, leave them out: {words}")
+    text = "{error}; tie points without a place, leave them out: {words}"
+    return NotConvergedError(phrase("unconverged_ties", text, error=error.said, words=words))
 
 
 def _unplaced(network: Network, state: State, caution: float) -> Iterator[tuple[str, PointState, str]]:
@@ -88,7 +90,7 @@ def _apart(residuals: Floats, sigma: Floats, seen: Flags) -> Floats:
     return np.asarray(np.sqrt(squares / np.maximum(2 * seen.sum(axis=1) - 3, 1)))
 
 
-def without_images(network: Network, failure: Failure) -> tuple[Network, list[str]] | None:
+def without_images(network: Network, failure: Failure) -> tuple[Network, list[Phrase]] | None:
     """The network without the images that nothing orients.
 
     Args:
@@ -108,4 +110,5 @@ def without_images(network: Network, failure: Failure) -> tuple[Network, list[st
         return None
     less = sub_network(network, keep, np.ones(len(network.points), dtype=bool))
     surveyed = np.array([point.role in SURVEYED for point in less.points], dtype=bool)
-    return only_points(less, surveyed | (rays(less) > 0)), [f"not oriented: {defect.message}" for defect in defects]
+    said = [phrase("left_out_image", "not oriented: {why}", why=defect.said) for defect in defects]
+    return only_points(less, surveyed | (rays(less) > 0)), said

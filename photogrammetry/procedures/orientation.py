@@ -21,6 +21,7 @@ from photogrammetry.procedures.left_out import START_CAUTION, unplaced_points, w
 from photogrammetry.procedures.stages import constrained_stage, search_block
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
+from rig.phrase import Phrase, phrase
 
 _MOVING: Final = "H*"  # helmet
 
@@ -39,7 +40,7 @@ class Orientation:
     outcome: Outcome
     stages: tuple[Stage, ...]
     notes: tuple[str, ...]
-    left_out: tuple[str, ...] = ()
+    left_out: tuple[Phrase, ...] = ()
 
 
 def orient(
@@ -69,13 +70,13 @@ def orient(
     outcome, stages, left_out = _oriented(network)
     refuse_ambiguous(network, outcome.adjustment)
     refuse_contradicted(network, outcome.adjustment)
-    return Orientation(outcome, stages, (*held, *notes, *left_out), tuple(left_out))
+    return Orientation(outcome, stages, (*held, *notes, *map(str, left_out)), tuple(left_out))
 
 
-def _oriented(network: Network) -> tuple[Outcome, tuple[Stage, ...], list[str]]:
+def _oriented(network: Network) -> tuple[Outcome, tuple[Stage, ...], list[Phrase]]:
     """The three stages; where they fail, without images that nothing orients and ties that their rays do not place."""
     gone: dict[str, str] = {}
-    said: list[str] = []
+    said: list[Phrase] = []
     while True:
         try:
             outcome, stages = _in_stages(without_points(network, gone))
@@ -102,7 +103,9 @@ def _oriented(network: Network) -> tuple[Outcome, tuple[Stage, ...], list[str]]:
             gone = {name: words for name, words in gone.items() if name not in back}
         except (NotSolvableError, NotConvergedError, RefusedError):
             pass  # they do not fit
-    return outcome, stages, [*said, *(f"point {name} is left out: {words}" for name, words in gone.items())]
+    text = "point {point} is left out: {why}"
+    left_out = [phrase("left_out_point", text, point=name, why=words) for name, words in gone.items()]
+    return outcome, stages, [*said, *left_out]
 
 
 def _in_stages(network: Network) -> tuple[Outcome, tuple[Stage, ...]]:

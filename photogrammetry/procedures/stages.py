@@ -47,6 +47,7 @@ from photogrammetry.procedures.reference.similarity_stage import similarity_stag
 from photogrammetry.procedures.single_rays import contradicted_rays
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
+from rig.phrase import Phrase, phrase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,10 +154,10 @@ def constrained_stage(search: Search) -> tuple[Outcome, Stage]:
         outcome = adjust_least(network, other, search.network, snoop=True, family_risk=STAGE_RISK)
     outcome, more = _without_doubtful_points(outcome)
     aside += more
-    findings = (*(Finding(_aside_words(one), removed=False) for one in aside), *findings_of(outcome))
+    findings = (*(Finding(_aside(one), removed=False) for one in aside), *findings_of(outcome))
     stage = Stage(StageName.CONSTRAINED, adjusted_words(outcome), findings)
     outcome = replace(outcome, removed=(*search.removed, *outcome.removed), aside=tuple(aside))
-    refuse_absurd(outcome, [finding.message for part in (*search.stages, stage) for finding in part.findings])
+    refuse_absurd(outcome, [finding.said for part in (*search.stages, stage) for finding in part.findings])
     return outcome, stage
 
 
@@ -186,8 +187,9 @@ def _points_of(network: Network, blunder: Blunder) -> set[str]:
     return {observation_to_json(network, one)["point"] for one in blunder.candidates}
 
 
-def _aside_words(gone: Removed) -> str:
-    return f"{describe(gone.network, gone.blunder)}; the result does not use them"
+def _aside(gone: Removed) -> Phrase:
+    what = describe(gone.network, gone.blunder)
+    return phrase("blunder_aside", "{what}; the result does not use them", what=what)
 
 
 def snoop_network(network: Network) -> Outcome:
@@ -216,11 +218,11 @@ def snoop_network(network: Network) -> Outcome:
             return outcome
         start = whole.state
     outcome = adjust_least(network, start, network, snoop=True)
-    refuse_absurd(outcome, [finding.message for finding in findings_of(outcome)])
+    refuse_absurd(outcome, [finding.said for finding in findings_of(outcome)])
     return outcome
 
 
-def refuse_absurd(outcome: Outcome, findings: Sequence[str]) -> None:
+def refuse_absurd(outcome: Outcome, findings: Sequence[Phrase]) -> None:
     """Refuse an outcome that the global test calls absurd, or that lost more than a third of its survey.
 
     Args:
@@ -232,7 +234,10 @@ def refuse_absurd(outcome: Outcome, findings: Sequence[str]) -> None:
     """
     a = outcome.adjustment
     if is_unusable(a):
-        raise RefusedError(f"sigma0 is {GlobalTest(a.ratio, a.redundancy).words}{told_of(findings)}")
+        test = GlobalTest(a.ratio, a.redundancy)
+        text = "sigma0 is {words}"
+        absurd = phrase("refused_sigma0", text, words=test.words, ratio=f"{test.ratio:.3g}", high=test.limits[1])
+        raise RefusedError(told_of(absurd, findings))
     gone = [
         g.network.points[g.blunder.suspect.index].name
         for g in outcome.removed
@@ -240,4 +245,4 @@ def refuse_absurd(outcome: Outcome, findings: Sequence[str]) -> None:
     ]
     left = sum(point.role in SURVEYED for point in a.network.points)
     if 3 * len(gone) > len(gone) + left:
-        raise RefusedError(too_many(gone, len(gone) + left) + told_of(findings))
+        raise RefusedError(told_of(too_many(gone, len(gone) + left), findings))

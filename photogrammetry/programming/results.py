@@ -93,12 +93,12 @@ class Result:
     @property
     def gross_errors(self) -> tuple[str, ...]:
         """Suspected gross errors in words, the worst first."""
-        return tuple(describe(one.network, one.blunder) for one in self.outcome.suspected)
+        return tuple(describe(one.network, one.blunder).text for one in self.outcome.suspected)
 
     @property
     def removed(self) -> tuple[str, ...]:
         """Observations that were taken out, in words."""
-        return tuple(describe(one.network, one.blunder) for one in self.outcome.removed)
+        return tuple(describe(one.network, one.blunder).text for one in self.outcome.removed)
 
     @cached_property
     def cameras(self) -> dict[str, AdjustedCamera]:

@@ -9,6 +9,8 @@ import numpy as np
 from photogrammetry.network.model import AXES, ImageFrame, Network, Role
 from photogrammetry.network.selection import only_observations
 from rig.arrays import Floats
+from rig.phrase import Phrase, phrase
+from rig.phrases import in_turn
 
 
 class BlunderKind(StrEnum):
@@ -106,18 +108,21 @@ def observation_to_json(network: Network, observation: Observation) -> dict[str,
     return names
 
 
-def name_of(network: Network, observation: Observation) -> str:
+def name_of(network: Network, observation: Observation) -> Phrase:
     """The observation in words."""
     names = observation_to_json(network, observation)
     match observation.kind:
         case BlunderKind.IMAGE:
-            return f"point {names['point']} in image {names['image']}"
+            text = "point {point} in image {image}"
+            return phrase("observed_image", text, point=names["point"], image=names["image"])
         case BlunderKind.CONTROL:
-            return f"control point {names['point']}"
+            return phrase("observed_control", "control point {point}", point=names["point"])
         case BlunderKind.DISTANCE:
-            return f"distance {names['from']} to {names['to']}"
+            text = "distance {start} to {end}"
+            return phrase("observed_distance", text, start=names["from"], end=names["to"])
         case _:
-            return f"difference {names['axis']} from {names['from']} to {names['to']}"
+            text = "difference {axis} from {start} to {end}"
+            return phrase("observed_difference", text, axis=names["axis"], start=names["from"], end=names["to"])
 
 
 def in_file_frame(network: Network, pairs: Floats) -> Floats:
@@ -145,26 +150,28 @@ def blunder_to_json(network: Network, blunder: Blunder) -> dict[str, Any]:
         "w": blunder.w,
         "locatable": blunder.locatable,
         "candidates": [observation_to_json(network, candidate) for candidate in blunder.candidates],
-        "message": describe(network, blunder),
+        "message": describe(network, blunder).text,
     }
 
 
-def describe(network: Network, blunder: Blunder) -> str:
+def describe(network: Network, blunder: Blunder) -> Phrase:
     """A gross error in words."""
+    name, w = name_of(network, blunder.suspect), _test_value(blunder)
     if len(blunder.candidates) == 1:
-        name = name_of(network, blunder.suspect)
-        return f"{name} is suspected{_test_value(blunder)}, but there is no result without it; measure it again"
+        text = "{what} is suspected{w}, but there is no result without it; measure it again"
+        return phrase("blunder_needed", text, what=name, w=w)
     if not blunder.locatable:
-        names = "; ".join(name_of(network, candidate) for candidate in blunder.candidates)
-        return (
-            f"one of these observations is wrong{_test_value(blunder)}, but the data cannot tell which: {names}; "
-            "measure them again or add an observation"
+        text = (
+            "one of these observations is wrong{w}, but the data cannot tell which: {which}; measure them again or add "
+            "an observation"
         )
+        which = in_turn([name_of(network, candidate) for candidate in blunder.candidates])
+        return phrase("blunder_one_of", text, which=which, w=w)
     image = blunder.suspect.kind is BlunderKind.IMAGE
     unit = network.image_unit if image else network.length_unit
     size = ", ".join(f"{value:.3g}" for value in estimate_in_file(network, blunder))
-    name = name_of(network, blunder.suspect)
-    return f"{name}: wrong by about ({size}) {unit or 'length units'}{_test_value(blunder)}; measure it again"
+    text = "{what}: wrong by about ({size}) {unit}{w}; measure it again"
+    return phrase("blunder_sized", text, what=name, size=size, unit=unit or "length units", w=w)
 
 
 def _test_value(blunder: Blunder) -> str:

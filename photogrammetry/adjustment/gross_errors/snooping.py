@@ -29,6 +29,8 @@ from photogrammetry.geometry.camera_model import residuals
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network.model import Network
 from rig.arrays import Floats
+from rig.phrase import phrase
+from rig.phrases import in_turn
 
 Trial = Adjustment | NotSolvableError | NotConvergedError
 
@@ -116,8 +118,9 @@ def explained(error: NotConvergedError, network: Network, start: State, family_r
 def _named(error: NotConvergedError, network: Network, suspects: Sequence[Blunder]) -> NotConvergedError:
     if not suspects:
         return error
-    words = "; ".join(describe(network, suspect) for suspect in suspects[:_NAMED])
-    return NotConvergedError(f"no optimum, because something is grossly wrong: {words}")
+    what = in_turn([describe(network, suspect) for suspect in suspects[:_NAMED]])
+    text = "no optimum, because something is grossly wrong: {what}"
+    return NotConvergedError(phrase("unconverged_wrong", text, what=what))
 
 
 def _adjusted(network: Network, start: State) -> Adjustment | NotConvergedError:

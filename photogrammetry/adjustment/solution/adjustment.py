@@ -30,6 +30,7 @@ from photogrammetry.adjustment.solution.statistics import (
 from photogrammetry.network.diagnosis import Defect, DefectKind, NotConvergedError, NotSolvableError
 from photogrammetry.network.model import Network
 from rig.arrays import Floats, Integers
+from rig.phrase import phrase
 
 #: Sigmas: a smaller parameter is not significantly different from zero.
 _SIGNIFICANT = 1.96
@@ -228,10 +229,12 @@ def only_sound_numbers() -> Iterator[None]:
         with np.errstate(all="ignore"):
             yield
     except np.linalg.LinAlgError:
-        raise NotConvergedError("the numbers leave all bounds; check units and sigmas, or give start values") from None
+        text = "the numbers leave all bounds; check units and sigmas, or give start values"
+        raise NotConvergedError(phrase("unconverged_bounds", text)) from None
     except DatumError as error:
-        message = f"the datum points fall onto a line ({error.missing} conditions short); choose others"
-        raise NotSolvableError((Defect(DefectKind.DATUM, error.missing, message),)) from None
+        text = "the datum points fall onto a line ({missing} conditions short); choose others"
+        said = phrase("defect_datum_line", text, missing=error.missing)
+        raise NotSolvableError((Defect(DefectKind.DATUM, error.missing, said),)) from None
 
 
 def _adjusted(problem: Problem, start: State, defect: int, target: State) -> Adjustment:
@@ -245,10 +248,11 @@ def _adjusted(problem: Problem, start: State, defect: int, target: State) -> Adj
     controlled = redundancy(problem, equations, cofactors)
     adjusted = Adjustment(problem, state, iterations, free, equations, cofactors, controlled)
     if not abs(controlled.total - adjusted.redundancy) <= _LOST:
-        raise NotConvergedError(
+        text = (
             "the solution has lost its digits (the redundancy numbers do not add up); look for coordinates or sigmas "
             "that are out of all proportion"
         )
+        raise NotConvergedError(phrase("unconverged_digits", text))
     return adjusted
 
 
@@ -260,8 +264,9 @@ def cofactors_at(problem: Problem, state: State, equations: Equations, free: Fre
         factor = factorise(normals, moves / normals.scale[:, None])
     except SingularError:
         check_rank(problem, state)
-        message = "at the optimum the network is singular to working precision; estimate fewer camera parameters"
-        raise NotSolvableError((Defect(DefectKind.PARAMETERS, 0, message),)) from None
+        text = "at the optimum the network is singular to working precision; estimate fewer camera parameters"
+        said = phrase("defect_singular", text)
+        raise NotSolvableError((Defect(DefectKind.PARAMETERS, 0, said),)) from None
     if factor.condition < _DOUBTFUL:
         check_rank(problem, state)
     return s_transform(factor.cofactors(), moves, conditions)

@@ -23,6 +23,8 @@ from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.diagnosis import Defect, DefectKind, NotSolvableError
 from photogrammetry.network.model import DatumType
 from rig.arrays import Floats, Integers
+from rig.phrase import Phrase, phrase
+from rig.phrases import enumerated
 
 #: Eigenvalues of a unit-diagonal normal matrix below this are zero: rounding leaves about 1e-15. For a point it
 #: means rays that meet under less than a millionth of a radian.
@@ -63,11 +65,12 @@ def check_rank(problem: Problem, state: State) -> FreeDatum:
     _, again = _analysed(alike, state)
     if again:
         raise NotSolvableError(tuple(again))
-    message = (
-        f"the sigmas lie {orders_apart(problem, alike):.0f} orders of magnitude apart in their effect, and rounding "
-        "hides what the least accurate observations determine; give sigmas as large as the errors are"
+    text = (
+        "the sigmas lie {orders} orders of magnitude apart in their effect, and rounding hides what the least accurate "
+        "observations determine; give sigmas as large as the errors are"
     )
-    raise NotSolvableError((Defect(DefectKind.PARAMETERS, 0, message),))
+    said = phrase("defect_sigmas", text, orders=round(orders_apart(problem, alike)))
+    raise NotSolvableError((Defect(DefectKind.PARAMETERS, 0, said),))
 
 
 def _analysed(problem: Problem, state: State) -> tuple[FreeDatum, list[Defect]]:
@@ -128,13 +131,15 @@ def _camera_defect(problem: Problem, local: _Local) -> Defect:
     names = [name for name, part in zip(camera.estimate, share, strict=True) if part > _SHARE]
     images = tuple(image.name for image in problem.network.images if image.camera == local.index)
     if not np.any(problem.camera == local.index):
-        message = f"camera {camera.name} has no observations: {', '.join(names)} undetermined; estimate nothing of it"
+        text = "camera {camera} has no observations: {names} undetermined; estimate nothing of it"
+        said = phrase("defect_camera_unseen", text, camera=camera.name, names=", ".join(names))
     else:
-        message = (
-            f"camera {camera.name}: {', '.join(names)} cannot be told apart ({defect} undetermined); "
-            "estimate fewer of them or give them a sigma"
+        text = (
+            "camera {camera}: {names} cannot be told apart ({size} undetermined); estimate fewer of them or give them "
+            "a sigma"
         )
-    return Defect(DefectKind.PARAMETERS, defect, message, images=images)
+        said = phrase("defect_camera", text, camera=camera.name, names=", ".join(names), size=defect)
+    return Defect(DefectKind.PARAMETERS, defect, said, images=images)
 
 
 def _image_defects(problem: Problem, found: Sequence[_Local]) -> list[Defect]:
@@ -146,33 +151,39 @@ def _image_defects(problem: Problem, found: Sequence[_Local]) -> list[Defect]:
     defects = []
     if empty:
         size = sum(size for size, count in zip(sizes, seen, strict=True) if count == 0)
-        message = f"{_named('image', empty)} without observations ({size} undetermined): observe points, or drop them"
-        defects.append(Defect(DefectKind.IMAGES, size, message, images=empty))
+        text = "{which} without observations ({size} undetermined): observe points, or drop them"
+        said = phrase("defect_images_unseen", text, which=_images(empty), size=size)
+        defects.append(Defect(DefectKind.IMAGES, size, said, images=empty))
     for name, count, size in zip(names, seen, sizes, strict=True):
         if count:
-            message = (
-                f"image {name}: {count} observed points do not determine its pose ({size} undetermined); "
-                "observe more points in it, or drop it"
+            text = (
+                "image {image}: {count} observed points do not determine its pose ({size} undetermined); observe more "
+                "points in it, or drop it"
             )
-            defects.append(Defect(DefectKind.IMAGES, size, message, images=(name,)))
+            said = phrase("defect_pose", text, image=name, count=count, size=size)
+            defects.append(Defect(DefectKind.IMAGES, size, said, images=(name,)))
     return defects
 
 
 def _point_defects(problem: Problem, found: Sequence[_Local]) -> list[Defect]:
     """One entry for each number of rays: none, one, two or more."""
     rays = np.bincount(problem.point, minlength=len(problem.network.points))
-    reasons = {
-        0: "without observations: add at least two rays, or drop them",
-        1: "with one ray only, so the depth is open: observe them in a second image, or drop them",
-    }
+    unseen = "without observations: add at least two rays, or drop them"
+    single = "with one ray only, so the depth is open: observe them in a second image, or drop them"
+    parallel = "whose rays are parallel: observe them from another place, or drop them"
+    reasons = (
+        phrase("defect_no_ray", unseen),
+        phrase("defect_one_ray", single),
+        phrase("defect_parallel_rays", parallel),
+    )
     defects = []
     for count in sorted({min(int(rays[local.index]), 2) for local in found}):
         group = [local for local in found if min(int(rays[local.index]), 2) == count]
         names = tuple(problem.network.points[local.index].name for local in group)
         size = sum(local.null.shape[1] for local in group)
-        reason = reasons.get(count, "whose rays are parallel: observe them from another place, or drop them")
-        message = f"{_named('point', names)} {reason} ({size} undetermined)"
-        defects.append(Defect(DefectKind.POINTS, size, message, points=names))
+        text = "{which} {why} ({size} undetermined)"
+        said = phrase("defect_points", text, which=_points(names), why=reasons[count], size=size)
+        defects.append(Defect(DefectKind.POINTS, size, said, points=names))
     return defects
 
 
@@ -181,25 +192,26 @@ def _datum_defects(problem: Problem, state: State, free: FreeDatum) -> list[Defe
         return []
     if problem.network.datum.type is not DatumType.INNER:
         parts = _free_parts(free, state)
-        message = (
-            f"no datum: nothing fixes the network's {parts} ({free.defect} undetermined); "
-            'add control points, a distance, or take "datum": {"type": "inner"}'
+        text = (
+            "no datum: nothing fixes the network's {parts} ({size} undetermined); add control points, a distance, or "
+            'take "datum": {{"type": "inner"}}'
         )
-        return [Defect(DefectKind.DATUM, free.defect, message)]
+        return [Defect(DefectKind.DATUM, free.defect, phrase("defect_datum", text, parts=parts, size=free.defect))]
     points = datum_points(problem.network)
     try:
         inner_operator(problem, state, free, points)
     except DatumError as error:
         names = tuple(problem.network.points[i].name for i in points)
-        message = (
-            f"the datum {_named('point', names)} do not fix the datum ({error.missing} conditions short); "
-            "choose at least three that are not on a line"
+        text = (
+            "the datum {which} do not fix the datum ({missing} conditions short); choose at least three that are not "
+            "on a line"
         )
-        return [Defect(DefectKind.DATUM, error.missing, message, points=names)]
+        said = phrase("defect_datum_points", text, which=_points(names), missing=error.missing)
+        return [Defect(DefectKind.DATUM, error.missing, said, points=names)]
     return []
 
 
-def _free_parts(free: FreeDatum, state: State) -> str:
+def _free_parts(free: FreeDatum, state: State) -> Phrase:
     """The free ones of position, rotation and scale in words, with the number of free parameters of each."""
     size = float(np.abs(state.xyz - free.centre).max(initial=0.0)) or 1.0
     shares = free.directions / np.array([size] * 3 + [1.0] * 4)[:, None]  # in units of similar effect on the network
@@ -207,12 +219,15 @@ def _free_parts(free: FreeDatum, state: State) -> str:
     # Dimensions of the combinations without scale, then of those without scale and rotation.
     without_scale = free.defect - _rank(shares[6:])
     translations = free.defect - _rank(shares[3:])
-    parts = {
-        "position": translations,
-        "rotation": without_scale - translations,
-        "scale": free.defect - without_scale,
-    }
-    return ", ".join(f"{name} ({count})" if count > 1 else name for name, count in parts.items() if count)
+    parts = (
+        (translations, phrase("free_position", "position")),
+        (without_scale - translations, phrase("free_rotation", "rotation")),
+        (free.defect - without_scale, phrase("free_scale", "scale")),
+    )
+    return enumerated(
+        [part if count == 1 else phrase("free_several", "{part} ({count})", part=part, count=count)
+         for count, part in parts if count]
+    )  # fmt: skip
 
 
 def _rank(rows: Floats) -> int:
@@ -264,20 +279,23 @@ def _joint_defect(problem: Problem, share: Floats, size: int) -> Defect:
     ]
     parts = _parts(problem)
     if len(parts) > 1:
-        message = (
-            f"the network falls into {len(parts)} parts that nothing ties together ({size} undetermined), the smallest "
-            f"of them {_named('image', parts[0])}; observe common points"
+        text = (
+            "the network falls into {parts} parts that nothing ties together ({size} undetermined), the smallest of "
+            "them {which}; observe common points"
         )
-        return Defect(DefectKind.IMAGES, size, message, images=parts[0])
+        said = phrase("defect_parts", text, parts=len(parts), size=size, which=_images(parts[0]))
+        return Defect(DefectKind.IMAGES, size, said, images=parts[0])
     if parameters:
-        message = (
-            f"{', '.join(parameters)} cannot be told from the poses and points ({size} undetermined); take images "
-            "rolled by 90 degrees and from other distances, estimate fewer parameters, or give them a sigma"
+        text = (
+            "{names} cannot be told from the poses and points ({size} undetermined); take images rolled by 90 degrees "
+            "and from other distances, estimate fewer parameters, or give them a sigma"
         )
-        return Defect(DefectKind.PARAMETERS, size, message, points, images)
+        said = phrase("defect_interior", text, names=", ".join(parameters), size=size)
+        return Defect(DefectKind.PARAMETERS, size, said, points, images)
     kind, names = (DefectKind.IMAGES, images) if images else (DefectKind.POINTS, points)
-    message = f"{_named(kind.value[:-1], names)} are not determined together ({size} undetermined); add observations"
-    return Defect(kind, size, message, points, images)
+    text = "{which} are not determined together ({size} undetermined); add observations"
+    which = _images(names) if images else _points(names)
+    return Defect(kind, size, phrase("defect_joint", text, which=which, size=size), points, images)
 
 
 def _parts(problem: Problem) -> list[tuple[str, ...]]:
@@ -294,6 +312,18 @@ def _parts(problem: Problem) -> list[tuple[str, ...]]:
     return sorted(parts, key=len)
 
 
-def _named(what: str, names: Sequence[str]) -> str:
-    listed = ", ".join(names[:_NAMED]) + (f" and {len(names) - _NAMED} more" if len(names) > _NAMED else "")
-    return f"{what}{'s' if len(names) != 1 else ''} {listed}"
+def _images(names: Sequence[str]) -> Phrase:
+    if len(names) == 1:
+        return phrase("named_image", "image {name}", name=names[0])
+    return phrase("named_images", "images {names}", names=_listed(names))
+
+
+def _points(names: Sequence[str]) -> Phrase:
+    if len(names) == 1:
+        return phrase("named_point", "point {name}", name=names[0])
+    return phrase("named_points", "points {names}", names=_listed(names))
+
+
+def _listed(names: Sequence[str]) -> str | Phrase:
+    listed, more = ", ".join(names[:_NAMED]), len(names) - _NAMED
+    return listed if more <= 0 else phrase("named_more", "{names} and {more} more", names=listed, more=more)

@@ -15,6 +15,7 @@ from photogrammetry.adjustment.solution.datum import NOTHING_FREE, FreeDatum, fi
 from photogrammetry.adjustment.solution.normals import Normals, SingularError, build_normals, factorise
 from photogrammetry.network.diagnosis import NotConvergedError
 from rig.arrays import Floats
+from rig.phrase import phrase
 
 MAX_ITERATIONS = 60
 #: The iteration ends when the next undamped step moves no quantity by more than this part of its standard deviation.
@@ -102,9 +103,8 @@ def solve(problem: Problem, start: State, defect: int) -> tuple[State, int, Free
         free = _iterate(problem, progress, defect)
         if free is not None:
             return progress.state, progress.iterations, free
-    raise NotConvergedError(
-        f"no optimum after {MAX_ITERATIONS} iterations; give better start values, or estimate fewer camera parameters"
-    )
+    text = "no optimum after {most} iterations; give better start values, or estimate fewer camera parameters"
+    raise NotConvergedError(phrase("unconverged_iterations", text, most=MAX_ITERATIONS))
 
 
 def one_step(problem: Problem, start: State, defect: int) -> tuple[State, bool]:
@@ -121,7 +121,8 @@ def one_step(problem: Problem, start: State, defect: int) -> tuple[State, bool]:
 def _begin(problem: Problem, start: State) -> _Progress:
     progress = _Progress(start, problem.square_sum(start), problem.behind(start))
     if not np.isfinite(progress.square_sum):
-        raise NotConvergedError("the start values have no images (a point in a projection centre); give better ones")
+        text = "the start values have no images (a point in a projection centre); give better ones"
+        raise NotConvergedError(phrase("unconverged_start", text))
     return progress
 
 
@@ -161,7 +162,8 @@ def _advance(problem: Problem, normals: Normals, free: FreeDatum, progress: _Pro
                 progress.damping = damping * _LESS if damping > _FIRST_DAMPING else 0.0
                 return False
         damping = max(_FIRST_DAMPING, damping * _MORE)
-    raise NotConvergedError("no step reduces the residuals any more; give better start values")
+    text = "no step reduces the residuals any more; give better start values"
+    raise NotConvergedError(phrase("unconverged_step", text))
 
 
 def _step(problem: Problem, normals: Normals, free: FreeDatum, state: State, damping: float) -> Floats | None:

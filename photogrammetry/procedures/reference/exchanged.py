@@ -14,6 +14,7 @@ from photogrammetry.procedures.reference.reference_estimate import ReferencePoin
 from photogrammetry.procedures.reference.reference_fit import ReferenceFit, fit_reference
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import Phrase, phrase
 
 #: A point lies where another one was surveyed if the square of the difference over its covariance is below this.
 _THERE = float(special.chdtri(3, SINGLE_RISK))
@@ -33,14 +34,18 @@ class Exchange:
     seen: bool = True
 
     @property
-    def words(self) -> str:
+    def said(self) -> Phrase:
         """The finding in words."""
         if not self.seen:
             first, other = self.points
-            return f"{first} lies where the survey has {other}: {first} and {other} look exchanged; correct the names"
-        names = f"{', '.join(self.points[:-1])} and {self.points[-1]}"
-        where = "the other" if len(self.points) == 2 else "the next"
-        return f"{names} look exchanged, each lies where the survey has {where}; correct the names"
+            text = "{first} lies where the survey has {other}: {first} and {other} look exchanged; correct the names"
+            return phrase("exchanged_unseen", text, first=first, other=other)
+        names, last = ", ".join(self.points[:-1]), self.points[-1]
+        if len(self.points) == 2:
+            text = "{names} and {last} look exchanged, each lies where the survey has the other; correct the names"
+            return phrase("exchanged_two", text, names=names, last=last)
+        text = "{names} and {last} look exchanged, each lies where the survey has the next; correct the names"
+        return phrase("exchanged_more", text, names=names, last=last)
 
 
 def find_exchanges(

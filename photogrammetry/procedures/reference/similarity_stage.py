@@ -35,6 +35,8 @@ from photogrammetry.procedures.reference.reference_estimate import ReferencePoin
 from photogrammetry.procedures.reference.reference_fit import ReferenceFit, fit_reference, reference_points
 from rig.arrays import Floats
 from rig.errors import BadInputError
+from rig.phrase import Phrase, phrase
+from rig.phrases import in_turn
 
 
 def similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | None, list[Removed], Stage]:
@@ -53,19 +55,20 @@ def similarity_stage(network: Network, free: Outcome) -> tuple[ReferenceFit | No
     survey = {network.points[i].name: network.points[i] for i in order}
     exchanges = find_exchanges(fit, reference, covariance, survey)
     wrong = [Removed(_blunder(suspect, surveyed, network, a), network) for suspect in fit.removed]
-    told = [f"{describe(network, gone.blunder)}; {_tests_of(s)}" for gone, s in zip(wrong, fit.removed, strict=True)]
+    told = [
+        in_turn([describe(network, gone.blunder), _tests_of(s)]) for gone, s in zip(wrong, fit.removed, strict=True)
+    ]
     for exchange in exchanges:
         if not exchange.seen:
             unseen = _unseen(network, exchange, wrong)
             wrong.append(unseen)
             told.append(describe(network, unseen.blunder))
-    findings = [Finding(words, removed=True) for words in told]
-    findings += [
-        Finding(f"{describe(network, _blunder(suspect, surveyed, network, a))}; {_tests_of(suspect)}", removed=False)
-        for suspect in fit.suspects
-    ]
+    findings = [Finding(said, removed=True) for said in told]
+    for suspect in fit.suspects:
+        blunder = _blunder(suspect, surveyed, network, a)
+        findings.append(Finding(in_turn([describe(network, blunder), _tests_of(suspect)]), removed=False))
     _refuse_fit(fit, exchanges, reference, covariance, list(survey))
-    findings += [Finding(exchange.words, removed=False) for exchange in exchanges]
+    findings += [Finding(exchange.said, removed=False) for exchange in exchanges]
     return fit, wrong, Stage(StageName.SIMILARITY, _fit_words(fit, network), tuple(findings), _tests(fit, survey))
 
 
@@ -86,22 +89,26 @@ def _refuse_fit(
     if not (absurd or fit.too_many):
         return
     _refuse_mirrored(reference, covariance)
-    words = told_of([exchange.words for exchange in exchanges])
+    known = [exchange.said for exchange in exchanges]
     if fit.too_many:
-        raise RefusedError(too_many([names[suspect.index] for suspect in fit.removed], len(reference)) + words)
-    raise RefusedError(
-        f"the survey contradicts the images: carried onto the {len(reference)} reference points, the free block has "
-        f"sigma0 {fit.estimate.ratio:.3g} (a priori 1); check names, units and sigmas of the survey, the interior "
-        f"orientations, and whether two cameras are exchanged{words}"
+        gone = [names[suspect.index] for suspect in fit.removed]
+        raise RefusedError(told_of(too_many(gone, len(reference)), known))
+    text = (
+        "the survey contradicts the images: carried onto the {count} reference points, the free block has sigma0 "
+        "{ratio} (a priori 1); check names, units and sigmas of the survey, the interior orientations, and whether two "
+        "cameras are exchanged"
     )
+    absurd_fit = phrase("refused_survey", text, count=len(reference), ratio=f"{fit.estimate.ratio:.3g}")
+    raise RefusedError(told_of(absurd_fit, known))
 
 
 def _refuse_mirrored(reference: Sequence[ReferencePoint], covariance: Floats) -> None:
     if is_mirrored(reference, covariance, STAGE_RISK):
-        raise RefusedError(
+        text = (
             "the survey is mirrored: it fits the images once an axis is turned round; X, Y, Z must be right-handed, so "
             "exchange two axes or the sign of one"
         )
+        raise RefusedError(phrase("refused_mirrored", text))
 
 
 def _is_gross(fit: ReferenceFit, reference: Sequence[ReferencePoint]) -> bool:
@@ -138,10 +145,10 @@ def _tests(fit: ReferenceFit, survey: Mapping[str, Point]) -> tuple[PointTest, .
     )
 
 
-def _tests_of(suspect: Suspect) -> str:
+def _tests_of(suspect: Suspect) -> Phrase:
     """The tests of a reference point's coordinates in words."""
     w, r = (" ".join(f"{value:.2f}" for value in values) for values in (suspect.single, suspect.controlled))
-    return f"w of X, Y, Z {w}, redundancy numbers {r}"
+    return phrase("blunder_tests", "w of X, Y, Z {w}, redundancy numbers {r}", w=w, r=r)
 
 
 def _blunder(suspect: Suspect, surveyed: Sequence[int], network: Network, free: Adjustment) -> Blunder:

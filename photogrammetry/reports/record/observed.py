@@ -220,9 +220,9 @@ def _named(a: Adjustment, kind: Kind, item: int, part: int) -> str:
     network = a.network
     match kind:
         case Kind.DISTANCE:
-            return name_of(network, Observation(BlunderKind.DISTANCE, item))
+            return name_of(network, Observation(BlunderKind.DISTANCE, item)).text
         case Kind.DIFFERENCE:
-            return name_of(network, Observation(BlunderKind.DIFFERENCE, item))
+            return name_of(network, Observation(BlunderKind.DIFFERENCE, item)).text
         case Kind.CAMERA:
             return f"camera {network.cameras[item].name} {INTERIOR[part]}"
         case _:

@@ -60,7 +60,7 @@ PARTS = sorted(path.stem.removeprefix("en") for path in (PAGE / "i18n").glob("en
 #: Dialogs that belong to a view.
 DIALOGS = {"list-preview": "live", "kinogram-large": "recording"}
 #: The rooms whose sentences reach the page.
-SPEAKING = ("rig", "capture", "triggering", "recorder", "analysis", "service", "webpanel", "svev")
+SPEAKING = ("rig", "photogrammetry", "capture", "triggering", "recorder", "analysis", "service", "webpanel", "svev")
 #: Which argument of these calls is the code; the templates follow it.
 SAYING = {"phrase": 0, "passed": 1, "warning": 1, "failure": 1}
 
@@ -276,6 +276,7 @@ def test_findings_events_and_reasons_are_said_in_norwegian_too_with_the_values_t
             "nb-digitizing.js",
             "nb-targets.js",
             "nb-files.js",
+            "nb-adjustment.js",
         )
     ]
     assert set().union(*listed) == heard

@@ -117,10 +117,10 @@ def test_two_rays_cannot_say_which_of_them_is_wrong() -> None:
     entry = blunder_to_json(network, found)
     assert (entry["image"], entry["point"], entry["estimate"]) == (None, None, [])
     assert {(c["image"], c["point"]) for c in entry["candidates"]} == {("hill-1", "T2"), ("hill-2", "T2")}
-    assert "cannot tell" in describe(network, found)
-    assert f"is wrong (w = {abs(found.w):.1f})" in describe(network, found)
+    assert "cannot tell" in describe(network, found).text
+    assert f"is wrong (w = {abs(found.w):.1f})" in describe(network, found).text
     # with hardly any other observation sigma0 grows with the error: a small test value would seem to deny it
-    assert "is wrong, but" in describe(network, replace(found, w=1.2))
+    assert "is wrong, but" in describe(network, replace(found, w=1.2)).text
     assert sum(blunder.suspect in found.candidates for blunder in find_blunders(adjust_once(network))) == 1
 
 

@@ -50,7 +50,7 @@ def test_three_points_fit_several_poses(command: str, tmp_path: Path, capsys: py
     assert "images" not in result
     words = capsys.readouterr().out
     assert "(-12.000, -38.000, 4.000)" in words
-    assert words.count(" or (") >= 1
+    assert words.count(" / (") >= 1
 
 
 def test_a_fourth_point_or_an_approximate_pose_decides() -> None:

@@ -64,8 +64,8 @@ def test_a_log_of_films_is_a_log(
         assert frames["left"].frame_id == (None if pulse == 3 else 101 + pulse)
         assert all(camera.offset_us is None and camera.device_time is None for camera in frames.values())
     assert "imported" in info(out).to_json()
-    assert log_facts(out).messages[0].startswith("exposure time of left, K2, right is unknown")
-    assert "without a trigger" in log_facts(out).messages[1]
+    assert log_facts(out).messages[0].text.startswith("exposure time of left, K2, right is unknown")
+    assert "without a trigger" in log_facts(out).messages[1].text
 
 
 def test_other_commands_take_it(

@@ -77,7 +77,7 @@ def test_a_camera_reads_out_another_region_and_the_rig_is_armed_anew(tmp_path: P
         with LogReader(log) as reader:
             calibrated = [message.topic for message in reader.messages("/calibration/K1", "/calibration/K2")]
         assert calibrated == [f"/calibration/{name}" for name in cameras]
-        assert [message for message in log_facts(log).messages if "calibration" in message] == said
+        assert [message.text for message in log_facts(log).messages if "calibration" in message.text] == said
     whole, part = _seen(before, load_rig(path)), _seen(after, kept)
     assert (whole.shape, part.shape) == ((480, 1280), (480, 960))
     crop = whole[96:336, 160:480]

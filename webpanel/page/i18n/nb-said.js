@@ -1,5 +1,6 @@
 /** What the service says, in Norwegian, by code. */
 
+import { adjustment } from "./nb-adjustment.js";
 import { analysis } from "./nb-analysis.js";
 import { digitizing } from "./nb-digitizing.js";
 import { events } from "./nb-events.js";
@@ -10,4 +11,4 @@ import { statements } from "./nb-statements.js";
 import { targets } from "./nb-targets.js";
 
 /** @type {Record<string, [string, string?]>} text and advice */
-export const said = { ...statements, ...findings, ...events, ...analysis, ...refusals, ...digitizing, ...targets, ...files };
+export const said = { ...statements, ...findings, ...events, ...analysis, ...refusals, ...digitizing, ...targets, ...files, ...adjustment };

@@ -18,15 +18,8 @@ from rig.events import Level as EventLevel
 from rig.host.files import make_folder
 from rig.phrase import Phrase, from_plain, phrase, plain
 from rig.settings.model import AnalysisSettings
-from service.measuring.results import (
-    VIDEO,
-    keep_file,
-    keep_problem,
-    keep_renamed,
-    keep_result,
-    keep_step,
-    names_of,
-)
+from service.measuring.keeping import keep_file, keep_problem, keep_renamed, keep_result, keep_step
+from service.measuring.results import VIDEO, names_of
 from service.measuring.retries import source_mark
 
 #: Where results are made, before they are whole.

@@ -9,7 +9,8 @@ from typing import Final
 from rig.errors import BadInputError
 from rig.host.files import TEXT_MAX, read_whole
 from rig.settings.model import AnalysisSettings, RigSettings
-from service.measuring.results import failed_by, note_source
+from service.measuring.keeping import note_source
+from service.measuring.results import failed_by
 
 #: Of a file that cannot be read.
 _UNREADABLE: Final = ""

@@ -17,7 +17,8 @@ from recorder.log.measured_path import measured_path
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery, folded
 from rig.api.jump import LastJump
 from rig.api.statement import Level
-from service.measuring.results import jumps_of, outcome_path
+from service.measuring.outcome import outcome_path
+from service.measuring.results import jumps_of
 from service.recordings.live_results import summaries
 
 #: What is repeated of a session field, however long the log has it.

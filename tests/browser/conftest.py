@@ -20,7 +20,7 @@ from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, e
 from rig.api.jump import LastJump, MeasuredValue
 from rig.frame import FrameStatus
 from rig.phrase import phrase
-from service.measuring.results import keep_result
+from service.measuring.keeping import keep_result
 from tests.recorder.logs import ALL_OK
 from tests.support.processes import shared_from_now_on
 from tests.webpanel.conftest import client, panel, service

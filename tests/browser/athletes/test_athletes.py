@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from analysis.result import file as result_file
 from rig.api.jump import LastJump, MeasuredValue
-from service.measuring.results import keep_result
+from service.measuring.keeping import keep_result
 from tests.analysis.result.recordings import recording
 from tests.browser.conftest import Open
 from tests.browser.views import assert_fits_a_phone

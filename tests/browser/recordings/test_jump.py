@@ -13,7 +13,7 @@ from analysis.cameras.standing import Standing
 from analysis.report.overlay_file import write_overlay
 from analysis.result import file as result_file
 from analysis.worker.findings import summary
-from service.measuring.results import keep_result
+from service.measuring.keeping import keep_result
 from tests.analysis.report.jumps import measured_recording, write_jump_log
 from tests.analysis.simulated import RATE_HZ, SIZE, true_cameras
 from tests.browser.conftest import Open

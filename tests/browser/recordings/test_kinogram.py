@@ -7,7 +7,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.api.measuring import MeasuringQueue, MeasuringState
-from service.measuring.results import keep_renamed, names_of
+from service.measuring.keeping import keep_renamed
+from service.measuring.results import names_of
 from tests.browser.conftest import Open, write_kinogram
 from tests.browser.views import assert_fits_a_phone
 from tests.webpanel.memory_service import MemoryService

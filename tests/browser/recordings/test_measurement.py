@@ -15,7 +15,7 @@ from rig.api.recordings import RecordingOrder
 from rig.api.statement import Level, Statement
 from rig.api.status import State
 from rig.settings.model import AnalysisSettings
-from service.measuring.results import keep_problem, keep_step
+from service.measuring.keeping import keep_problem, keep_step
 from tests.browser.conftest import Open, keep_measured
 from tests.browser.views import assert_fits_a_phone
 from tests.webpanel.memory_service import MemoryService

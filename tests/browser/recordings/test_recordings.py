@@ -13,7 +13,7 @@ from playwright.sync_api import expect
 
 from recorder.reading.corrected_log import corrected_log
 from rig.frame import FrameStatus
-from service.measuring.results import keep_result
+from service.measuring.keeping import keep_result
 from tests.browser.conftest import MEASURED, Open, write_kinogram
 from tests.browser.views import assert_fits_a_phone, enter
 from tests.recorder.logs import ALL_OK

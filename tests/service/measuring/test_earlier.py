@@ -11,7 +11,7 @@ from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import write_session_changes
 from rig.api.jump import LastJump
 from service.measuring.earlier import earlier_jumps
-from service.measuring.results import keep_result
+from service.measuring.keeping import keep_result
 from service.recordings.measured_jumps import MeasuredJumps
 from tests.recorder.logs import ALL_OK, write_log
 

@@ -10,7 +10,8 @@ import pytest
 from rig.api.measuring import MeasuringState
 from rig.api.statement import Level, Statement
 from rig.settings.model import AnalysisSettings
-from service.measuring.results import failed_by, keep_problem
+from service.measuring.keeping import keep_problem
+from service.measuring.results import failed_by
 from service.measuring.retries import Retries, source_mark
 from simrig.world.survey import survey
 from tests.analysis.simulated import training

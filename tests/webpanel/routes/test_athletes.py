@@ -22,7 +22,7 @@ from analysis.result import file as result_file
 from recorder.log.jumper_path import jumper_path
 from rig.api.jump import LastJump, MeasuredValue
 from rig.api.recordings import RecordingOrder
-from service.measuring.results import keep_result
+from service.measuring.keeping import keep_result
 from tests.analysis.result.recordings import recording
 from tests.recorder.logs import ALL_OK
 from tests.webpanel.memory_service import MemoryService, write_recording

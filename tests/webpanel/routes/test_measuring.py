@@ -13,7 +13,8 @@ from recorder.log.jumper_path import jumper_path
 from rig.api.jump import LastJump
 from rig.api.statement import Statement
 from rig.settings.model import AnalysisSettings
-from service.measuring.results import keep_problem, keep_result, measurement_of
+from service.measuring.keeping import keep_problem, keep_result
+from service.measuring.results import measurement_of
 from service.recordings.digitized import digitized_downloads
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import refused

@@ -2,7 +2,8 @@
 
     python -m tests.browser.pictures OUT
 
-The real service measures two jumps of the simulated hill; it takes a minute or two.
+The real service measures two jumps of the simulated hill; it takes some minutes. Beside the pictures there is a sheet
+of each view, as the documentation has it (`docs/images/panel-*.jpg`).
 """
 
 import os
@@ -16,7 +17,9 @@ from pathlib import Path
 from typing import Final, Literal
 from urllib.parse import quote
 
-from playwright.sync_api import Browser, sync_playwright
+import cv2
+import numpy as np
+from playwright.sync_api import Browser, Page, sync_playwright
 
 from bench.analysis.hill_logs import write_hill_log
 from tests.analysis.simulated import training
@@ -27,16 +30,24 @@ from tests.support.waiting import wait_until
 
 ATHLETE: Final = "Anna Øverbø"
 WIDTHS: Final = (360, 768, 1280)
+HEIGHT: Final = 1000
+#: The service is reached as from a phone, so that there is a code to show: by this name, which leads here (RFC 6761).
+NAME: Final = "hill.localhost"
+TOKEN: Final = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of these pictures alone
+#: What a sheet shows, side by side, and how large.
+SHEET: Final = ((1280, "light", "en"), (768, "dark", "nb"), (360, "dark", "en"), (360, "light", "nb"))
+SCALE: Final = 0.6
 SCHEMES: Final[tuple[Literal["light", "dark"], ...]] = ("light", "dark")
 LANGUAGES: Final = ("en-GB", "nb-NO")
 #: What is there when a view has what it shows.
 VIEWS: Final = {
     "jump": ("#/recordings/jump-2", "#kinogram-jumps img"),
     "coach": ("#/coach", "#coach-replay[data-stage=ready]"),
+    "day": ("#/jumps", "#day-table td"),
     "athlete": (f"#/athlete/{quote(ATHLETE)}", "#athlete-table td"),
     "comparison": ("api/comparison.html?first=jump-1&second=jump-2&language={language}", "main"),
 }
-_MEASURED_S: Final = 240
+_MEASURED_S: Final = 600
 
 
 @contextmanager
@@ -51,7 +62,11 @@ def measured(folder: Path) -> Iterator[Serving]:
             log = write_hill_log(folder / f"hill-{number}", scenario, range(16, 66))
             shutil.copy(log.path, data / f"jump-{number}.mcap")
         rig.write_text(rig.read_text() + f'[analysis]\nsurvey = "{log.survey}"\n')
-        with serving(folder, rig, loopback, data=data) as service:
+        reached = ("--allow-host", NAME, "--proxy", "127.0.0.1")
+        environment = {"SVEV_TOKEN": TOKEN}
+        with serving(
+            folder, rig, loopback, *reached, data=data, environment=environment, host="127.0.0.1", token=TOKEN
+        ) as service:
             for number in (1, 2):
                 path = f"/api/recordings/jump-{number}"
                 service.call("PATCH", path, {"athlete": ATHLETE, "bib": "17", "gate": "12"})
@@ -68,17 +83,45 @@ def _is_done(service: Serving, number: int) -> bool:
 
 def take(browser: Browser, service: Serving, out: Path) -> None:
     """Take all pictures."""
+    address = service.url.replace("127.0.0.1", NAME)
     for width, scheme, locale in product(WIDTHS, SCHEMES, LANGUAGES):
-        context = browser.new_context(
-            viewport={"width": width, "height": 780 if width < 600 else 900}, locale=locale, color_scheme=scheme
-        )
-        for name, (address, ready) in VIEWS.items():
+        context = browser.new_context(viewport={"width": width, "height": HEIGHT}, locale=locale, color_scheme=scheme)
+        context.set_default_timeout(1e3 * _MEASURED_S)
+        _log_in(context.new_page(), address)
+        for name, (path, ready) in VIEWS.items():
             page = context.new_page()
-            page.goto(f"{service.url}/{address.format(language=locale[:2])}")
+            page.goto(f"{address}/{path.format(language=locale[:2])}")
             page.locator(ready).first.wait_for()
-            page.screenshot(path=out / f"{name}-{width}-{scheme}-{locale[:2]}.png", full_page=name != "coach")
+            page.screenshot(path=_picture(out, name, width, scheme, locale[:2]))
+            page.screenshot(path=out / f"{name}-{width}-{scheme}-{locale[:2]}-whole.png", full_page=True)
             page.close()
         context.close()
+    for name in VIEWS:
+        _write_sheet(out, name)
+
+
+def _log_in(page: Page, address: str) -> None:
+    page.goto(address)
+    page.locator("#login-token").fill(TOKEN)
+    page.locator("#login-submit").click()
+    page.locator("#login").wait_for(state="hidden")
+    page.close()
+
+
+def _picture(out: Path, name: str, width: int, scheme: str, language: str) -> Path:
+    return out / f"{name}-{width}-{scheme}-{language}.png"
+
+
+def _write_sheet(out: Path, name: str) -> None:
+    """The pictures of a view that stand for all, side by side with a gap, as a small file."""
+    row = []
+    for width, scheme, language in SHEET:
+        picture = cv2.imread(str(_picture(out, name, width, scheme, language)))
+        if picture is None:
+            raise FileNotFoundError(f"no picture of {name}")
+        row += [picture, np.full((HEIGHT, 24, 3), 255, np.uint8)]
+    sheet = cv2.resize(np.hstack(row[:-1]), None, fx=SCALE, fy=SCALE, interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(out / f"panel-{name}.jpg"), sheet, [cv2.IMWRITE_JPEG_QUALITY, 80])
 
 
 def main() -> None:

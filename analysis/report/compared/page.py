@@ -8,15 +8,16 @@ import numpy as np
 
 from analysis.comparison.aligned import MeasuredJump
 from analysis.comparison.difference import LEVEL, Difference, Power
-from analysis.comparison.report import WORDS, Comparison, deviation, in_words, instants, plain, plus_minus, signed
+from analysis.comparison.report import WORDS, Comparison, in_words, instants, plain, plus_minus, signed
 from analysis.comparison.shared_calibration import Common
 from analysis.report.compared.charts import difference_chart, value_chart
 from analysis.report.compared.places import Images, at_places
 from analysis.report.compared.words import figure, first_letter_large, quantity, said, text
 from analysis.report.course import course_of
+from analysis.report.figures import plus_minus as with_sigma
 from analysis.report.language import LANGUAGES, Language, Said, day_of, same, shown
 from analysis.report.still_page import still_page
-from analysis.result.model import QUANTITIES
+from analysis.result.model import QUANTITIES, Quantity
 from rig.clocks import NS_PER_S
 
 #: So many charts of what differs are shown at once; the others are unfolded.
@@ -133,10 +134,9 @@ def _greatest(comparison: Comparison, name: str) -> Said:
     if at is None:
         return same("")
     value, since = float(d.value[row, at]), float(d.times[at])
-    _, _, unit, decimals = WORDS[name]
     when = said("before" if since < 0 else "after", at=figure(f"{abs(since):.2f}"))
-    size = figure(f"{abs(value):.{decimals}f} ± {deviation(name, d.sigma[row, at])}")
-    words = said("less" if value < 0 else "more", quantity=quantity(name), size=size, unit=unit, when=when)
+    size = figure(with_sigma(Quantity(abs(value), float(d.sigma[row, at])), WORDS[name][2]))
+    words = said("less" if value < 0 else "more", quantity=quantity(name), size=size, when=when)
     scatter = comparison.scatter
     if scatter is not None and np.isfinite(scatter.deviation[row, at]):
         own = said("own", p=figure(in_words(float(scatter.p(d.value)[row, at]))))

@@ -1,9 +1,8 @@
 """What a kinogram says, in English and Norwegian beside each other: who gets it has no setting for its language."""
 
-import math
 from typing import Final
 
-from analysis.report.figures import EARLY_S, FAR_M, fixed
+from analysis.report.figures import EARLY_S, FAR_M, decimals, fixed, plus_minus
 from analysis.report.kinogram.figures import FEWEST, UNITS, Mark, Reference, Word
 from analysis.report.kinogram.model import Kinogram
 from analysis.report.kinogram.shots import Missing, Shot
@@ -11,9 +10,6 @@ from analysis.report.language import Said
 from analysis.result.model import MeasuredRecording, Quantity
 
 KMH: Final = 3.6  #: km/h in one m/s
-_MOST_DECIMALS: Final = {"°": 1}  # more says no coach; of all others as many as sigma allows
-_MOST: Final = 4
-
 
 _EARLY_NB: Final = f"{EARLY_S:g}".replace(".", ",")
 TITLES: Final = {
@@ -70,17 +66,17 @@ def where_words(shot: Shot) -> str:
 
 
 def number_words(name: str, quantity: Quantity) -> list[str]:
-    """A figure with its sigma to the sigma's first digit; the take-off speed in km/h too."""
-    lines = [_with_sigma(quantity, UNITS[name])]
+    """A figure with its sigma as everywhere; the take-off speed in km/h too."""
+    lines = [plus_minus(quantity, UNITS[name])]
     if name == "takeoff_speed":
-        lines.append(_with_sigma(Quantity(KMH * quantity.value, KMH * quantity.sigma), "km/h"))
+        lines.append(f"{fixed(KMH * quantity.value, 1)} km/h")
     return lines
 
 
 def mark_words(name: str, mark: Mark) -> Said:
     """The mark with the difference."""
     said = MARKS[mark.word]
-    places = _decimals(max(abs(mark.difference) / 5, 1e-3), UNITS[name])
+    places = 1 if UNITS[name] == "°" else decimals(max(abs(mark.difference) / 5, 2e-3))
     amount = fixed(mark.difference, places)
     amount = amount if mark.difference < 0 or not float(amount) else f"+{amount}"
     return Said(f"{said.english} {amount}", said.norwegian)
@@ -123,19 +119,3 @@ def facts_words(kinogram: Kinogram, result: MeasuredRecording, hill: str) -> lis
             facts.append(Said(f"{said.english} {text}", f"{said.norwegian} {text}"))
     bib = result.session.get("bib", "").strip()
     return ([Said(f"{BIB.english} {bib}", f"{BIB.norwegian} {bib}")] if bib else []) + facts
-
-
-def _with_sigma(quantity: Quantity, unit: str) -> str:
-    places = _decimals(quantity.sigma, unit)
-    least = 10.0**-places
-    sigma = f"< {fixed(least, places)}" if quantity.sigma < least / 2 else fixed(quantity.sigma, places)
-    text = f"{fixed(quantity.value, places)} ± {sigma}"
-    return f"{text}{unit}" if unit == "°" else f"{text} {unit}"
-
-
-def _decimals(sigma: float, unit: str) -> int:
-    """To the first digit of a standard deviation."""
-    most = _MOST_DECIMALS.get(unit, _MOST)
-    if not (math.isfinite(sigma) and sigma > 0):
-        return most
-    return min(most, max(0, -math.floor(math.log10(sigma))))

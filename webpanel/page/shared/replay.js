@@ -64,8 +64,8 @@ export function makeReplay(root, { may, button }) {
   /** @type {Stage} */
   let stage = "";
   let playing = !still;
-  /** Which camera is shown, counted on and on; 0: all. */
-  let camera = button && NARROW.matches ? 1 : 0;
+  /** Which camera is shown, counted on and on; 0: all. Where nobody can choose, each has its turn. */
+  let camera = NARROW.matches ? 1 : 0;
   /** What is in sight. @type {Frame|null} */
   let painted = null;
   let wake = () => {};
@@ -123,6 +123,7 @@ export function makeReplay(root, { may, button }) {
       const [now, next] = [frames[index], frames[index + 1]];
       await new Promise((resolve) => setTimeout(resolve, !seen ? IDLE_MS : next ? 1000 * SLOWER * (next.time_s - now.time_s) : REST_MS));
       if (seen) index = next ? index + 1 : 0;
+      if (seen && !next && !button && camera) camera = camera % scene.cameras.length + 1;
     }
   }
 

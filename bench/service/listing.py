@@ -1,4 +1,4 @@
-"""Measures how long a service takes to list 2000 recordings and their jumps, just started and later."""
+"""Measures how long a service takes to list 2000 recordings and their jumps, and for what pages of jumps ask it."""
 
 import os
 import shutil
@@ -13,7 +13,7 @@ from bench.service.serving import ServedRig, served_rig
 from recorder.reading.corrected_log import corrected_log
 from rig.api.jump import LastJump, MeasuredValue
 from rig.errors import BadInputError
-from service.measuring.results import keep_result
+from service.measuring.keeping import keep_result
 
 _LOGS: Final = 2000
 _PULSES: Final = 30
@@ -33,14 +33,29 @@ _QUERIES: Final = {
     "jumps of a day": "/api/jumps?since=2026-02-01T00:00:00Z&until=2026-02-02T00:00:00Z",
     "all jumps": _ALL[1],
 }
+_LAST: Final = "/api/recordings/jump-1999"
+#: What a page asks for when it is opened, one after the other.
+_PAGES: Final = {
+    "athlete's page": ("/api/status", "/api/jumps?athlete=anna%20berg"),
+    "table of a day": ("/api/status", "/api/jumps?limit=1", _QUERIES["jumps of a day"]),
+    "jump's page": (
+        "/api/status", _LAST, f"{_LAST}/pulses", f"{_LAST}/moment?jump=1", f"{_LAST}/measurement?jumps=false",
+        f"{_LAST}/notes", f"{_LAST}/voice-notes", f"{_LAST}/links",
+    ),
+    "coach's screen": (
+        "/api/status", "/api/recordings?limit=2", f"{_LAST}/measurement?jumps=false", f"{_LAST}/pulses",
+        f"{_LAST}/moment", "/api/rig",
+    ),
+}  # fmt: skip
 
 
 def run_listing(directory: Path) -> list[dict[str, Any]]:
     """List 2000 logs of their own, each with its athlete, bib and a measured jump.
 
     Returns:
-        A case for each query: its median time by clock once the service has listed them before, beside that of the
-        first list of a service that has just been started; and the processor's time of both.
+        A case for each query, and for all that a page asks for: the median time by clock once the service was asked the
+        same before, beside that of the first answer of a service that has just been started; and the processor's time
+        of both.
 
     Raises:
         ProcessDiedError: the service fails.
@@ -50,8 +65,11 @@ def run_listing(directory: Path) -> list[dict[str, Any]]:
         folder.mkdir(parents=True, exist_ok=True)
         _write_logs(folder)
         with served_rig(folder) as service:  # reads all logs, and keeps what it read
-            [_list(service, path) for path in _ALL]
-        return [_measure(folder, name, path) for name, path in _QUERIES.items()]
+            [_ask(service, (path,)) for path in _ALL]
+        return [
+            *(_measure(folder, name, (path,)) for name, path in _QUERIES.items()),
+            *(_measure(folder, name, paths) for name, paths in _PAGES.items()),
+        ]
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -83,10 +101,10 @@ def _keep_jump(log: Path, number: int) -> None:
     keep_result(made, log, (jump,))
 
 
-def _measure(folder: Path, name: str, path: str) -> dict[str, Any]:
+def _measure(folder: Path, name: str, paths: tuple[str, ...]) -> dict[str, Any]:
     with served_rig(folder) as service:
-        first = _list(service, path)
-        again = [_list(service, path) for _ in range(_REPEATS)]
+        first = _ask(service, paths)
+        again = [_ask(service, paths) for _ in range(_REPEATS)]
     return {
         "name": f"{name}, of {_LOGS}", "unit": "ms", "value": round(median(wall for wall, _ in again), 1),
         "cpu_ms": round(sum(cpu for _, cpu in again) / _REPEATS, 1),
@@ -94,12 +112,12 @@ def _measure(folder: Path, name: str, path: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _list(service: ServedRig, path: str) -> tuple[float, float]:
-    """Times of one answer by clock and by the service's processor, ms."""
+def _ask(service: ServedRig, paths: tuple[str, ...]) -> tuple[float, float]:
+    """Times of the answers together, by clock and by the service's processor, ms."""
     cpu, began = _cpu_ms(service.pid), time.perf_counter()
-    answer = service.call("GET", path)
+    answers = [service.call("GET", path) for path in paths]
     taken = (time.perf_counter() - began) * 1e3, _cpu_ms(service.pid) - cpu
-    if path in _ALL and len(answer.json()) != _LOGS:
+    if paths[0] in _ALL and len(answers[0].json()) != _LOGS:
         raise BadInputError(f"not all {_LOGS} recordings are listed: name an --out without a folder listing")
     return taken
 

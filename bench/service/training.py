@@ -76,7 +76,8 @@ def run_training(jumpers: int, every_s: float, folder: Path, *, analysis: bool) 
             case = {"name": "measured" if analysis else "not measured", "jumpers": jumpers}
             case |= _frames(recordings) | {"right_names": _right_names(recordings, names)}
             if analysis:
-                found = [_measured(service, each["id"]) for each in recordings]
+                deadline = time.monotonic() + jumpers * _MEASURED_S
+                found = [_measured(service, each["id"], deadline) for each in recordings]
                 case |= _figures(recordings, found) | {"right_pages": _right_pages(service, recordings, names)}
                 case["still_waiting"] = _still_waiting(service)
             return case
@@ -110,15 +111,14 @@ def _recorded(service: ServedRig, jumpers: int, every_s: float) -> list[dict[str
         time.sleep(_LOOK_S)
 
 
-def _measured(service: ServedRig, recording: str) -> dict[str, Any]:
+def _measured(service: ServedRig, recording: str, deadline: float) -> dict[str, Any]:
     """The measurement of a recording, once it has come to an end."""
-    deadline = time.monotonic() + _MEASURED_S
     while True:
         found: dict[str, Any] = service.json("GET", f"/api/recordings/{recording}/measurement")
         if found["state"] in {"done", "failed"}:
             return found
         if time.monotonic() > deadline:
-            raise ProcessDiedError(f"{recording} is not measured within {_MEASURED_S:g} s")
+            raise ProcessDiedError(f"{recording} is not measured yet, {_MEASURED_S:g} s a jumper after the last one")
         time.sleep(_LOOK_S)
 
 

@@ -41,20 +41,20 @@ def bench(
     """Measure how fast this computer records and computes; each figure stands beside a baseline of the same run.
 
     paper, saturated, double: record three simulated GigE Vision cameras; the baseline is gst-launch-1.0 (aravissrc to
-    fakesink and to filesink) with the same cameras. Figures are CPU-seconds per GB of image data, without the work
-    of the simulated cameras. firewire: the same on an emulated FireWire bus. cameras-8, hertz-200: eight cameras
-    640 x 480 at 30 Hz, three at 200 Hz: frames expected, complete and lost, processor time of each process, and
-    bytes to the disk. parts: pairing, composing, checksum and drawing, each alone. api: answer times of the service
-    while it records at 30 Hz; the baseline is the idle service. catalogue, listing: lists of many recordings and
-    jumps; the baseline is a service that has just been started. intersection, planning: intersections of rays and
-    planned networks. adjustment: free networks with full covariance; the baseline is scipy's least_squares. jumps,
-    jump-faults: rendered jumps are measured, without and with faults. jump-honesty: the same with many drawn
-    surveys, errors beside their sigmas. jump-repeats: one jump filmed again and again, and with another leg angle:
-    how often comparisons find a difference; about seven seconds a draw. live: how soon a worker tells the state of
-    each pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all measurements and with a
-    marker or a ski missing for a while; about two seconds a draw. gross-errors: hills with exchanged names, wrong
-    survey, wrong image points or wrong units: what the search for gross errors makes of them. pairing: triplets
-    mixed, not found and invented under clocks that are set and rates that the rig file does not name.
+    fakesink and to filesink) with the same cameras. Figures are CPU-seconds per GB of image data, without the work of
+    the simulated cameras. firewire: the same on an emulated FireWire bus. cameras-8, hertz-200: eight cameras 640 x 480
+    at 30 Hz, three at 200 Hz: frames expected, complete and lost, processor time of each process, and bytes to the
+    disk. parts: pairing, composing, checksum and drawing, each alone. api: answer times of the service while it records
+    at 30 Hz; the baseline is the idle service. catalogue, listing: lists of many recordings and jumps, and what pages
+    of jumps ask for; the baseline is a service that has just been started. intersection, planning: intersections of
+    rays and planned networks. adjustment: free networks with full covariance; the baseline is scipy's least_squares.
+    jumps, jump-faults: rendered jumps are measured, without and with faults. jump-honesty: the same with many drawn
+    surveys, errors beside their sigmas. jump-repeats: one jump filmed again and again, and with another leg angle: how
+    often comparisons find a difference; about seven seconds a draw. live: how soon a worker tells the state of each
+    pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all measurements and with a marker or a
+    ski missing for a while; about two seconds a draw. gross-errors: hills with exchanged names, wrong survey, wrong
+    image points or wrong units: what the search for gross errors makes of them. pairing: triplets mixed, not found and
+    invented under clocks that are set and rates that the rig file does not name.
 
     Example: svev bench saturated --seconds 10
     """

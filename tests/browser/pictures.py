@@ -42,7 +42,7 @@ LANGUAGES: Final = ("en-GB", "nb-NO")
 #: What is there when a view has what it shows.
 VIEWS: Final = {
     "jump": ("#/recordings/jump-2", "#kinogram-jumps img"),
-    "coach": ("#/coach", "#coach-replay[data-stage=ready]"),
+    "coach": ("#/coach", "#coach-replay[data-pulse='24']"),  # he is in the middle of the pictures
     "day": ("#/jumps", "#day-table td"),
     "athlete": (f"#/athlete/{quote(ATHLETE)}", "#athlete-table td"),
     "comparison": ("api/comparison.html?first=jump-1&second=jump-2&language={language}", "main"),

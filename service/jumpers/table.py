@@ -273,8 +273,11 @@ def _line(number: int, row: Sequence[str], columns: Sequence[str]) -> NewLine:
     except ValidationError as error:
         first = error.errors()[0]
         column = ".".join(str(part) for part in first["loc"])
-        text = "line {line}, column {column}: {why}; correct it"
-        raise BadInputError(phrase("list_field", text, line=number, column=column, why=first["msg"])) from None
+        if (most := first.get("ctx", {}).get("max_length")) is not None:
+            text = "line {line}, column {column}: more than {most} letters; shorten it"
+            raise BadInputError(phrase("list_field_long", text, line=number, column=column, most=most)) from None
+        text = "line {line}, column {column}: holds letters that nobody sees, such as a tab; take them out"
+        raise BadInputError(phrase("list_field_unseen", text, line=number, column=column)) from None
 
 
 def _check_bibs(numbers: Sequence[int], lines: Sequence[NewLine]) -> None:

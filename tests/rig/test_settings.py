@@ -378,7 +378,7 @@ PATHS: dict[str, tuple[str, Callable[[Any], Path]]] = {
 
 
 def test_every_path_says_where_it_begins_and_begins_there(tmp_path: Path) -> None:
-    """As the page of the rig file has it: what describes the rig is relative to its file, where recordings go not."""
+    """The rule of `docs/reference/rig-file.md`: parts of the rig are relative to its file, recordings are not."""
     schema = json.loads(rig_schema())
     tables = {"": schema, **{f"{name}.": table for name, table in schema["$defs"].items()}}
     said = {

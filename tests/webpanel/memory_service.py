@@ -98,6 +98,7 @@ class MemoryService(Archive):
         calibrating: what the calibration helper shows, set by tests.
         balls: where each camera should show the balls, set by tests.
         preview_calls: how often somebody asked for a picture.
+        pulses_a_picture: of so many pulses one has a picture.
         settings: the rig file, whose `[analysis]` tests set.
         measurings: measures the recordings while it is entered.
     """
@@ -123,6 +124,7 @@ class MemoryService(Archive):
         self.rehearsal: RehearsalProgress | None = None
         self.rehearsed: Rehearsal | None = None
         self.preview_calls = 0
+        self.pulses_a_picture = 1
         self.pulses_made = TriggerView(
             source="gpio", rate_hz=30, controls=tuple(TriggerControl), running=True, saved=True
         )
@@ -297,11 +299,11 @@ class MemoryService(Archive):
     def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:
         self.preview_calls += 1
         deadline = time.monotonic() + timeout_s
-        while self.state not in {State.ARMED, State.RECORDING} or self._pulse() == newer_than:
+        while self.state not in {State.ARMED, State.RECORDING} or self._pictured() == newer_than:
             if time.monotonic() > deadline:
                 return None
             time.sleep(0.005)
-        pulse = self._pulse()
+        pulse = self._pictured()
         pixels = np.random.default_rng(pulse).integers(0, 256, SHAPE, dtype=np.uint8)
         return Preview(pulse, pixels, COLUMNS, ALL_OK)
 
@@ -430,6 +432,11 @@ class MemoryService(Archive):
 
     def _pulse(self) -> RigPulse:
         return RigPulse(int((time.monotonic() - self._armed_at) * 30) + 1)
+
+    def _pictured(self) -> RigPulse:
+        """The newest pulse that there is a picture of."""
+        newest = self._pulse()
+        return RigPulse(newest - (newest - 1) % self.pulses_a_picture)
 
     @staticmethod
     def _camera(name: str, columns: tuple[int, int], armed: bool) -> CameraStatus:

@@ -66,6 +66,25 @@ def test_commands_of_seven_tabs_do_not_wait(
     assert len(service.catalogue.entries()) == 1
 
 
+def test_no_picture_is_fetched_twice_but_who_comes_later_gets_the_last_one(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    service.arm()
+    page = open_page("about:blank")
+    page.add_init_script(NO_WORKER)
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url) if "preview.jpg" in request.url else None)
+    page.goto(panel.url)
+    while len(asked) < 6:
+        page.wait_for_event("request")
+    assert len(set(asked)) == len(asked), "each asks for another picture than the one before"
+    service.pulses_a_picture = 2**40  # no more of them come
+    page.locator(".nav a[href='#/log']").click()
+    expect(page.locator("#preview img")).not_to_have_attribute("src", re.compile("."))
+    page.locator(".nav a[href='#/live']").click()
+    await_picture(page)
+
+
 def test_without_shared_workers_a_hidden_tab_gives_its_connections_back(
     panel: Panel, service: MemoryService, open_page: Open
 ) -> None:

@@ -52,6 +52,8 @@ export function makeHub(evenHidden) {
   let last = null;
   let following = false;
   let looking = false;
+  /** Of the picture that was fetched last; "0": some tab has none yet. */
+  let pulse = "0";
   /** Ends the stream that is open. */
   let stream = new AbortController();
   let wake = () => {};
@@ -148,7 +150,6 @@ export function makeHub(evenHidden) {
   async function look() {
     if (looking) return;
     looking = true;
-    let pulse = "0";
     while (viewers().length) {
       const why = await fetchPicture();
       if (why) {
@@ -186,7 +187,10 @@ export function makeHub(evenHidden) {
     if (request.type === "bye") tabs.delete(tab);
     if (request.type === "shown") tab.ready = true;
     if (request.type === "wish") {
-      tab.ready ||= request.picture && !tab.picture; // one that was on its way has got lost
+      if (request.picture && !tab.picture) {
+        tab.ready = true; // one that was on its way has got lost
+        pulse = "0";
+      }
       Object.assign(tab, { visible: request.visible, picture: request.picture });
     }
     if (request.type === "retry") {

@@ -23,10 +23,10 @@ from rig.phrase import phrase
 from service.measuring.keeping import keep_result
 from tests.recorder.logs import ALL_OK
 from tests.support.processes import shared_from_now_on
-from tests.webpanel.conftest import client, panel, service
+from tests.webpanel.conftest import client, panel
 from tests.webpanel.memory_service import MemoryService, write_recording
 
-__all__ = ["browser", "client", "open_page", "panel", "service"]
+__all__ = ["browser", "client", "open_page", "panel"]
 
 #: The machine may be busy: what is waited for takes a second or two on a quiet one.
 PATIENCE_MS = 40_000
@@ -164,6 +164,14 @@ def keep_measured(log: Path, jumps: tuple[LastJump, ...]) -> None:
     ):
         (made / name).write_text(name)
     keep_result(made, log, jumps)
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> MemoryService:
+    """The rig: idle, no recordings. It shows three pictures a second: a browser draws each without a graphics card."""
+    rig = MemoryService(tmp_path)
+    rig.pulses_a_picture = 10
+    return rig
 
 
 @pytest.fixture

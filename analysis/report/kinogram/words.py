@@ -76,7 +76,8 @@ def number_words(name: str, quantity: Quantity) -> list[str]:
 def mark_words(name: str, mark: Mark) -> Said:
     """The mark with the difference."""
     said = MARKS[mark.word]
-    places = 1 if UNITS[name] == "°" else decimals(max(abs(mark.difference) / 5, 2e-3))
+    places = decimals(max(abs(mark.difference) / 2, 2e-3))
+    places = min(places, 1) if UNITS[name] == "°" else places
     amount = fixed(mark.difference, places)
     amount = amount if mark.difference < 0 or not float(amount) else f"+{amount}"
     return Said(f"{said.english} {amount}", said.norwegian)

@@ -19,11 +19,13 @@ from triggering.sources.choice import trigger_source
 
 #: A fault that a single record showed is over when so many pulses have come without it.
 _CALM_PULSES: Final = 128
+#: Frames that arrive late contradict their times, and a camera that needs no restart is not to be restarted.
+_DOUBT: Final = "pairing_doubt"
 
 
 def _is_doubtful(alarm: Alarm) -> bool:
     """Whether a slow computer causes such a warning too: one cause is one alarm. An error stays: frames may mix."""
-    return alarm.topic in {RATE, SPREAD} and alarm.level is not Level.ERROR
+    return (alarm.topic in {RATE, SPREAD} or alarm.said.code == _DOUBT) and alarm.level is not Level.ERROR
 
 
 @dataclass(slots=True)

@@ -100,7 +100,7 @@ def test_a_start_list_on_two_phones(panel: Panel, service: MemoryService, open_p
     first.get_by_role("button", name="Edit").tap()
     (tmp_path / "wrong.csv").write_text("bib;athlete;recording\n1;A;B\n")
     first.locator("#list-file").set_input_files(tmp_path / "wrong.csv")
-    expect(first.get_by_role("alert")).to_contain_text('The list was not loaded. column "recording" has a name')
+    expect(first.get_by_role("alert")).to_contain_text('The list was not loaded: column "recording" has a name')
     second.get_by_role("button", name="Rediger").tap()
     second.locator("#list-file").set_input_files(tmp_path / "wrong.csv")
     expect(second.get_by_role("alert")).to_contain_text("kolonnen «recording» har et navn som hvert hopp bruker")

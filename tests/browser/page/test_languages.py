@@ -16,8 +16,10 @@ from tests.webpanel.serving import Panel
 def test_norwegian_from_the_browser_and_by_choice(
     panel: Panel, service: MemoryService, jumps: None, open_page: Open
 ) -> None:
+    service.jumpers.import_table(b"bib;athlete;club\n17;Anna;Lyn\n")
     page = open_page(panel.url, locale="nb-NO")
     expect(page.locator("#state-word")).to_have_text("Av")
+    expect(page.locator("#session-more")).to_have_text("Klubb: Lyn")
     expect(page.locator("#state-text")).to_contain_text("Kameraene er av.")
     expect(page.locator("html")).to_have_attribute("lang", "nb")
     enter(page, panel, "recordings/jump-2")

@@ -1,12 +1,14 @@
 """At every size of window, in both languages: no word is broken, nothing is cut off, what is needed is in sight."""
 
 import re
+from datetime import UTC, datetime
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
 from playwright.sync_api import TimeoutError as NotInTimeError
 
-from rig.api.status import State
+from rig.api.statement import Level, Statement
+from rig.api.status import Alarm, State
 from tests.browser.conftest import MEASURED, Open
 from tests.browser.views import BROKEN, READY, enter
 from tests.support.repeats import repeats
@@ -108,6 +110,29 @@ def test_messages_cover_neither_the_next_jumper_nor_the_buttons(
     bib.evaluate("element => element.scrollIntoView({ block: 'center' })")
     for element in (bib, page.locator("#next-step")):
         assert element.evaluate(BESIDE_THE_MESSAGE)
+
+
+@pytest.mark.parametrize("size", repeats([[SMALL_LAPTOP], [PHONE]]), ids="{0[0]}x{0[1]}".format)
+def test_four_alarms_and_a_refused_list_leave_record_and_save_in_reach(
+    panel: Panel, service: MemoryService, open_page: Open, size: tuple[int, int]
+) -> None:
+    text = "numbers, times and arrivals of the frames of a camera contradict each other, and its frames are not used"
+    said = Statement(level=Level.WARNING, code="", text=text, advice="disarm, restart the camera, and arm again")
+    service.alarms = tuple(
+        Alarm(number=number, topic=f"camera {number}", since=datetime.now(UTC), statement=said) for number in range(4)
+    )
+    service.arm()
+    page = open_page(panel.url, width=size[0], height=size[1])
+    expect(page.locator("#alarms li")).to_have_count(4)
+    refused = {"name": "list.csv", "mimeType": "text/csv", "buffer": b"bib;athlete\n1;A\n1;B\n"}
+    page.locator("#list-file").set_input_files(refused)  # type: ignore[arg-type]  # a list that is no file
+    expect(page.locator(".snack")).to_contain_text("bib 1 stands in lines 2 and 3")
+    assert in_sight(page, page.locator("#next-step"))
+    assert in_sight(page, page.locator("#save-last"))
+    right = {"name": "list.csv", "mimeType": "text/csv", "buffer": b"bib;athlete\n1;A\n2;B\n"}
+    page.locator("#list-file").set_input_files(right)  # type: ignore[arg-type]
+    expect(page.locator("#list-preview")).to_be_visible()
+    expect(page.locator(".snack")).to_have_count(0)
 
 
 def _swiped(page: Page, distance: int, camera: str) -> bool:

@@ -40,7 +40,7 @@ class Running:
         self.told: list[tuple[str, bool]] = []
         self.levels: dict[str, tuple[Level, str]] = {}
         self.said: list[str] = []
-        self._counts: list[dict[str, Any]] = [dict.fromkeys(("ok", *CAUSES), 0) for _ in NAMES]
+        self._counts: list[dict[str, Any]] = [dict.fromkeys(("ok", "doubted", *CAUSES), 0) for _ in NAMES]
         self._fetched: list[dict[str, Any]] = [{"missing_packets": 0, "underruns": 0} for _ in NAMES]
         self._seen, self._now = 0, 0.0
         self.rate_hz = rate_hz
@@ -254,6 +254,16 @@ def test_what_a_computer_that_is_too_slow_does_to_rate_and_spread_is_no_alarm_of
     assert [alarm.said.code for alarm in rig.watch.present] == ["alarm_computer"]
     rig.second(overloaded=(0, 1, 2), spread_usual_us=9000.0, spread_max_us=9000.0, alarm=True)
     assert "pairing_spread" in {alarm.said.code for alarm in rig.watch.present}, "that frames are paired wrongly counts"
+
+
+def test_frames_that_contradict_their_times_because_they_come_late_are_no_alarm_of_their_own() -> None:
+    rig, lost = Running(), {"lost": 10}
+    doubted = {"lost": 10, "doubted": 5}
+    rig.second(failed=({"doubted": 5}, {}, {}))
+    assert [code for code, _ in rig.told] == ["pairing_doubt"]
+    for _ in range(3):
+        rig.second(failed=(doubted, lost, lost), overloaded=(0, 1, 2))
+    assert [alarm.said.code for alarm in rig.watch.present] == ["alarm_computer"]
 
 
 def test_what_two_cameras_have_in_turn_is_one_alarm() -> None:

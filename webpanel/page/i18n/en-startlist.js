@@ -2,7 +2,7 @@
 export const words = {
   "list.load": "Load a list",
   "list.loaded": "The start list has {jumpers} jumpers.",
-  "list.refused": "The list was not loaded. {why}",
+  "list.refused": "The list was not loaded: {why}",
   "list.columns": "An Excel workbook (.xlsx) or CSV. One line names the columns: bib, athlete, gate, club, and any others.",
   "list.preview": "Load this list?",
   "list.found": "Jumpers in the file: {jumpers}; in the list now: {present}.",

@@ -2,7 +2,7 @@
 export const words = {
   "list.load": "Les inn en liste",
   "list.loaded": "Startlisten har {jumpers} hoppere.",
-  "list.refused": "Listen ble ikke lest inn. {why}",
+  "list.refused": "Listen ble ikke lest inn: {why}",
   "list.columns": "En Excel-arbeidsbok (.xlsx) eller CSV. Én linje navngir kolonnene: startnr, navn, bom, klubb, og eventuelt andre.",
   "list.preview": "Lese inn denne listen?",
   "list.found": "Hoppere i filen: {jumpers}; i listen nå: {present}.",

@@ -28,6 +28,8 @@ let chosen = {};
 let present = () => 0;
 /** @type {(list: StartList) => void} */
 let whenLoaded = () => {};
+/** Removes the message that the last file was refused. */
+let forget = () => {};
 
 /**
  * @param {() => number} jumpers how many the present list has
@@ -50,6 +52,7 @@ async function pick() {
   const [first, second] = new Uint8Array(content);
   file = new Blob([content], { type: first === 0x50 && second === 0x4b ? TYPES.workbook : TYPES.table }); // "PK"
   chosen = {};
+  forget();
   setText($("list-choose"), "");
   $("list-choices").replaceChildren();
   if (await look()) $("list-preview").showModal();
@@ -87,7 +90,7 @@ function query() {
 function refuse(error) {
   $("list-preview").close();
   // Which column or line is wrong stands in the service's words only.
-  if (error instanceof Problem && error.code === "bad_input") tell("error", t("list.refused", { why: say(error.detail).text }));
+  if (error instanceof Problem && error.code === "bad_input") forget = tell("error", t("list.refused", { why: say(error.detail).text }));
   else tellProblem(error);
 }
 
@@ -139,7 +142,7 @@ function choice(what, label) {
   return button;
 }
 
-/** @param {string} name */
-function nameOf(name) {
+/** @param {string} name of a column */
+export function nameOf(name) {
   return KNOWN.has(name) ? t(`field.${name}`) : name;
 }

@@ -12,6 +12,7 @@ import { inputOf, makeFields, writeFields } from "../shared/fields.js";
 import { who } from "../shared/format.js";
 import { attempt, tell, tellProblem } from "../shared/snacks.js";
 import { known, update, watch } from "../shared/store.js";
+import { nameOf } from "./listload.js";
 
 /** @typedef {import("../shared/types.js").NextJumper} NextJumper */
 
@@ -137,7 +138,7 @@ function draw() {
   }
   const { line, more } = status.next_jumper;
   setText($("next-jumper").querySelector("span"), t(line === null ? "session.next" : "session.skip"));
-  setText($("session-more"), Object.entries(more).map(([column, text]) => `${column}: ${text}`).join("  ·  "));
+  setText($("session-more"), Object.entries(more).map(([column, text]) => `${nameOf(column)}: ${text}`).join("  ·  "));
 }
 
 /** @param {NextJumper} jumper */

@@ -18,6 +18,7 @@ const SHOWN_MS = 10_000;
  * @param {import("./types.js").Level} level
  * @param {string} text
  * @param {Offer} [offer]
+ * @returns {() => void} removes it
  */
 export function tell(level, text, offer) {
   const snack = make("div", { class: "snack", "data-level": level, role: level === "error" ? "alert" : "status" },
@@ -31,6 +32,7 @@ export function tell(level, text, offer) {
   if (level === "error") all.querySelectorAll('[data-level="error"]').forEach((/** @type {Element} */ old) => old.remove());
   all.append(snack);
   if (level !== "error") setTimeout(remove, SHOWN_MS);
+  return remove;
 }
 
 /**

@@ -43,9 +43,9 @@ from service.recordings.in_progress import Outcome
 from service.recordings.storage import check_room_for
 from service.status.event_hub import EventHub
 from service.supervision.commands import at_once
+from service.supervision.picture import WarmUp
 from service.supervision.rig_session import StartHill
 from service.supervision.supervisor import Supervisor
-from service.supervision.warm_up import WarmUp
 from triggering.sources.choice import trigger_source
 
 T = TypeVar("T")

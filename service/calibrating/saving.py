@@ -9,7 +9,7 @@ from rig.events import Event, Level
 from rig.host.disk import replace_file
 from rig.phrase import Phrase, phrase
 from rig.settings.calibration import with_calibration, written_calibration
-from service.recordings.control import read_calibration
+from service.recordings.calibration import read_calibration
 from service.rig_file import keep
 from service.supervision.commands import at_once
 from service.supervision.settings_control import RigInUse

@@ -4,7 +4,7 @@ A rig of real cameras loads nothing of the simulated hill.
 """
 
 import ipaddress
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,18 +13,16 @@ from typing import TYPE_CHECKING, Final
 from capture.sim.camera import Scene
 from rig.clocks import HostNs
 from rig.errors import BadInputError
-from rig.pulse import PulseNumber
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger, IidcBroadcastTrigger, SoftwareTrigger, TriggerBoxTrigger
+from service.recordings.truth import WriteTruth
 
 if TYPE_CHECKING:
     from simrig.programs.simulated_hill import SimulatedHill
 
 #: Variable in which the simulated hill names the port of its trigger box.
 TRIGGER_PORT: Final = "SVEV_TRIGGER_PORT"
-#: Writes truth and survey of a recording; called with a path for each, and number and host time of each pulse.
-WriteTruth = Callable[[Path, Path, Iterable[tuple[PulseNumber, HostNs]]], None]
 
 
 def simulated_hill(

@@ -4,7 +4,7 @@ import contextlib
 import os
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -17,8 +17,9 @@ from rig.errors import ProcessDiedError, SvevError
 from rig.events import Event, Level
 from rig.phrase import phrase
 from rig.pulse import PulseNumber
-from service.processes.simulation import WriteTruth
 
+#: Writes truth and survey of a recording; called with a path for each, and number and host time of each pulse.
+WriteTruth = Callable[[Path, Path, Iterable[tuple[PulseNumber, HostNs]]], None]
 #: Cameras, recorder and panel take precedence.
 _NICENESS: Final = 15
 #: A disk that has taken nothing for so long hangs, s.

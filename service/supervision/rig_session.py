@@ -16,7 +16,8 @@ from rig.settings.model import RigSettings
 from rig.transport.recorder_commands import RecorderOptions, TellEvent
 from service.processes.backends import prepare_programs
 from service.processes.rig_processes import RigProcesses
-from service.processes.simulation import WriteTruth, hill_environment, simulated_truth
+from service.processes.simulation import hill_environment, simulated_truth
+from service.recordings.truth import WriteTruth
 
 #: Starts simulated cameras with pulse 0 at a host time; yields the environment variables that grabbers need for them.
 StartHill = Callable[[HostNs], AbstractContextManager[Mapping[str, str]]]

@@ -15,8 +15,8 @@ from rig.settings.model import RigSettings
 from rig.settings.region import named
 from rig.transport.recorder_commands import Calibration
 from service.processes.rig_processes import RigProcesses
-from service.recordings.control import RecordingControl
 from service.status.forbidden import FORBIDDEN
+from service.supervision.recording_control import RecordingControl
 from service.supervision.rig_session import RigSession
 from service.supervision.state_machine import StateMachine
 

@@ -27,20 +27,20 @@ from service.alarms.unrecorded import Unrecorded
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RECORDER
 from service.recordings import live_results
-from service.recordings.control import RecordingControl, read_calibration
+from service.recordings.calibration import read_calibration
 from service.recordings.storage import room_for
 from service.recordings.truth import TruthWriter
 from service.status.event_hub import EventHub
 from service.status.forbidden import FORBIDDEN
-from service.status.picture import Facts, picture
 from service.status.statements import measured, moved
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
+from service.supervision.picture import Facts, WarmUp, picture
+from service.supervision.recording_control import RecordingControl
 from service.supervision.rig_session import RigSession, StartHill
 from service.supervision.settings_control import RigInUse, SettingsControl
 from service.supervision.state_machine import StateMachine
 from service.supervision.train_control import TrainControl
-from service.supervision.warm_up import WarmUp
 from service.supervision.watching import STUCK_S, RecorderWatch, Settling, why_not_armed
 
 _TURN_S: Final = 0.2

@@ -5,7 +5,7 @@ from rig.api.status import State, Status
 from rig.health import Health
 from rig.settings.model import RigSettings
 from service.recordings.storage import Room
-from service.status.picture import Facts, picture
+from service.supervision.picture import Facts, picture
 from service.supervision.state_machine import Phase
 from service.supervision.watching import PulseRate
 

@@ -84,6 +84,23 @@ class Facts:
     restarts: dict[str, int]
 
 
+@dataclass(frozen=True, slots=True)
+class WarmUp:
+    """How far a rig has come since it was armed, for a command that waits for it.
+
+    Attributes:
+        state: the state of the service.
+        cameras: presence of each camera; None while there are no processes.
+        warm: whether complete triplets have come.
+        fault: why the rig is not armed; None in any other state.
+    """
+
+    state: State
+    cameras: tuple[CameraPresence, ...] | None
+    warm: bool
+    fault: Statement | None
+
+
 def picture(rig: RigSettings, facts: Facts) -> Status:
     """The status for the panel."""
     cameras = _cameras(rig, facts)

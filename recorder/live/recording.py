@@ -304,7 +304,11 @@ class Recording:
         Raises:
             StorageError: writing has ended.
         """
-        self._writer.write_event(msgspec.structs.replace(event, time=self._anchor.utc(time)))
+        self._writer.write_event(self.dated(event, time))
+
+    def dated(self, event: Event, time: HostNs) -> Event:
+        """An event that happened at `time`, on the time scale of the tags."""
+        return msgspec.structs.replace(event, time=self._anchor.utc(time))
 
     def health(self, health: bytes, time: HostNs) -> None:
         """Write the encoded health record of the second that ended at `time`.

@@ -163,9 +163,14 @@ class Recordings:
             self._report(self._parts.progress(self._recording))
 
     def happened(self, event: Event) -> None:
-        """Publish an event and write it into the recording; without one, keep it for a recording with pre-roll."""
-        self._publisher.event(event)
-        self._note(event, host_now())
+        """Publish an event and write it into the recording; without one, keep it for a recording with pre-roll.
+
+        While a recording runs, subscribers get events on the time scale of its tags, as they stand in the log, even if
+        the computer's clock is set meanwhile.
+        """
+        now = host_now()
+        self._publisher.event(event if self._recording is None else self._recording.dated(event, now))
+        self._note(event, now)
 
     def health(self, health: bytes) -> None:
         """Publish and write or keep an encoded health record likewise; end the recording if the disk is nearly full."""
@@ -303,7 +308,8 @@ class Recordings:
         recording.mishap = False
         recording.forget()
         taken = isinstance(error, NameTakenError)  # the service orders the recording again under another name
-        self._publisher.event(Event.now(Level.WARNING if taken else Level.FATAL, "recorder", error.said))
+        event = Event.now(Level.WARNING if taken else Level.FATAL, "recorder", error.said)
+        self._publisher.event(recording.dated(event, host_now()))
         recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
         if not whole:
             self._preroll.put_back(recording.take_back())

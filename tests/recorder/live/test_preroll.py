@@ -1,6 +1,8 @@
 """Recordings that begin in the past: every pulse once, in order, numbered from 1, whatever happens in between."""
 
 import itertools
+import json
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -25,7 +27,7 @@ from recorder.log.triplet_buffers import TripletBuffers
 from recorder.publishing.publisher import Publisher
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
-from rig.clocks import HostNs
+from rig.clocks import NS_PER_S, HostNs, UtcNs
 from rig.errors import StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
@@ -33,6 +35,7 @@ from rig.phrase import plain
 from rig.transport.recorder_commands import StartRecording
 from rig.transport.recorder_reports import RecorderReport, RecordingFinished, RecordingStarted
 from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, grey, ring_rig
+from tests.recorder.publishing.test_publisher import subscriber
 from tests.support.waiting import wait_until
 
 RIG = ring_rig(reserve_gb=0)
@@ -293,6 +296,40 @@ def test_what_happened_during_the_preroll_stands_in_the_log(tmp_path: Path, publ
         assert [bytes(m.data or b"") for m in reader.messages("/health")] == [b'{"free_triplets":3}']
     assert verify(second).events[0].message == "recording 1 started"
     assert _pulses(second) == list(range(61, 71)), "nothing is in two recordings"
+
+
+def test_events_of_a_recording_have_its_times_live_too(tmp_path: Path, publisher: Publisher) -> None:
+    """The computer's clock is set a year ahead meanwhile: subscribers and log are told the same times."""
+    later = UtcNs(time.time_ns() + 365 * 86400 * NS_PER_S)
+    with (
+        _recorder(tmp_path, publisher, seconds=1.0, limit=100) as recorder,
+        subscriber(publisher.address, b"event") as sub,
+    ):
+        wait_until(lambda: publisher._wanted(b"event"), "somebody has subscribed", timeout_s=30)
+        recorder.recordings.happened(Event.at(UtcNs(5), Level.INFO, "K1", plain("before it")))
+        _expose(recorder, 1, 10)
+        path = recorder.start(None)
+        recorder.recordings.happened(Event.at(later, Level.ERROR, "K2", plain("gone")))
+        recorder.recordings.stop()
+        recorder.finish()
+        recorder.start(None)
+        recording = recorder.recordings._recording
+        assert recording is not None
+        assert recording.log is not None
+        recording.log.give_up(StorageError("the disk fails: see to it"))
+        recorder.finish()
+        messages = ["before it", "recording 0 started", "gone", "recording stopped", "recording 1 started"]
+        heard = [json.loads(sub.recv_multipart()[1]) for _ in (*messages, "the disk fails")]
+        begun = recorder.reports[0]
+    assert isinstance(begun, RecordingStarted)
+    assert begun.first_pulse is not None
+    assert [event["message"].partition(":")[0] for event in heard] == [*messages, "the disk fails"]
+    times = [int(event["time_ns"]) for event in heard]
+    assert times[0] == 5
+    assert all(abs(at - begun.first_pulse) < 5 * NS_PER_S for at in times[1:])
+    with LogReader(path) as reader:
+        written = [Event.from_protobuf(bytes(m.data or b"")) for m in reader.messages("/events")]
+    assert [event.time for event in written[1:]] == times[1:4]  # the first is from before the recording
 
 
 def test_a_failing_disk_leaves_the_rest_of_the_past_for_another_try(tmp_path: Path, publisher: Publisher) -> None:

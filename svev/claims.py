@@ -60,6 +60,23 @@ def folder_claim(directory: Path, program: str, option: str) -> Iterator[None]:
         yield  # the file stays: nobody waits for a disk that hangs, to remove it
 
 
+@contextmanager
+def folder_claims(directory: Path, fallback: Path | None, program: str, option: str) -> Iterator[None]:
+    """As `folder_claim`, also of `recorder.fallback_directory`, in which a recording goes on whose disk fails.
+
+    One that is not there, or cannot be written, is not claimed and not made: its disk may come later, and the doctor
+    says that it is missing.
+
+    Raises:
+        BadInputError: another program has claimed one of them, or the first one cannot be made or written.
+    """
+    with ExitStack() as stack:
+        stack.enter_context(folder_claim(directory, program, option))
+        if fallback is not None and os.access(fallback, os.W_OK | os.X_OK) and not fallback.samefile(directory):
+            stack.enter_context(folder_claim(fallback, program, "recorder.fallback_directory"))
+        yield
+
+
 def _lock(descriptor: int, unsupported: frozenset[int] = frozenset()) -> bool:
     """Lock a file or folder; False if somebody else has it. Where that is not supported, nobody has.
 

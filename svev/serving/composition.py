@@ -54,7 +54,7 @@ from service.supervision.commands import at_once
 from service.supervision.supervisor import Supervisor
 from service.trains import Trains
 from svev import console
-from svev.claims import folder_claim, listen, url
+from svev.claims import folder_claims, listen, url
 from svev.serving.panel_doctor import PanelDoctor
 from svev.serving.systemd import JournalHandler, Notify, write_line
 from webpanel.app import create_app
@@ -114,7 +114,7 @@ def serve(settings: ServiceSettings) -> None:
     check_memory(rig, preroll_s)
     check_publication(rig.network)
     with ExitStack() as stack:
-        stack.enter_context(folder_claim(data, "svev serve", "--data"))
+        stack.enter_context(folder_claims(data, rig.recorder.fallback_directory, "svev serve", "--data"))
         listener = stack.enter_context(listen(settings.access.host, settings.port))
         logging.basicConfig(level=logging.WARNING, handlers=[JournalHandler()])
         notify = stack.enter_context(closing(Notify()))

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rig.errors import BadInputError
-from svev.claims import LOCK, folder_claim
+from svev.claims import LOCK, folder_claim, folder_claims
 
 
 def serve_claim(data: Path) -> AbstractContextManager[None]:
@@ -33,6 +33,24 @@ def test_a_directory_has_one_program_that_records(tmp_path: Path) -> None:
         pass
     (tmp_path / "file").touch()
     with pytest.raises(BadInputError, match="cannot be written"), record_claim(tmp_path / "file"):
+        pass
+
+
+def test_the_folder_on_another_disk_is_claimed_too(tmp_path: Path) -> None:
+    """Where a recording goes on when its own disk fails, nobody else records; it is not made where its disk is away."""
+    data, spare, other = tmp_path / "data", tmp_path / "spare", tmp_path / "other"
+    with folder_claims(data, spare, "svev serve", "--data"):
+        assert not spare.exists()
+    spare.mkdir()
+    with folder_claims(data, spare, "svev serve", "--data"):
+        with pytest.raises(BadInputError, match=rf"{spare}: another svev serve .*, or choose another --out"):
+            record_claim(spare).__enter__()
+        said = rf"{spare}: another svev serve .*, or choose another recorder.fallback_directory"
+        with pytest.raises(BadInputError, match=said):
+            folder_claims(other, spare, "svev record", "--out").__enter__()
+        with record_claim(other):
+            pass
+    with folder_claims(spare, spare / ".." / "spare", "svev serve", "--data"):
         pass
 
 

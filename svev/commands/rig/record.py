@@ -17,7 +17,7 @@ from service.headless import HeadlessRig
 from service.headless import record as record_with
 from service.recordings.storage import new_log_path
 from svev import console
-from svev.claims import folder_claim
+from svev.claims import folder_claims
 from svev.neighbours import naming_the_publisher
 
 
@@ -38,7 +38,7 @@ def record(
     wait for a disk that is slow or hangs.
 
     Exit codes: 0 recorded (also if frames are missing: see the counts), 2 bad input, another svev records into the
-    folder, or a camera does not answer,
+    folder or the one for a failed disk, or a camera does not answer,
     4 the disk failed, hung, was too slow or has too little room, 5 the cameras are ready, but no pulses come, or none
     came for a while (the log is whole, and "pauses" says when), or clocks, trigger or rate were wrong (the log is
     whole, and "alarms" says what), 6 the recorder died; the log is readable up to that moment.
@@ -50,7 +50,7 @@ def record(
     _check_session(session)
     check_publication(settings.network)
     with (
-        folder_claim(out, "svev record", "--out"),
+        folder_claims(out, settings.recorder.fallback_directory, "svev record", "--out"),
         naming_the_publisher(settings.network.publish),
         counted_endings() as asks,
         HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running,

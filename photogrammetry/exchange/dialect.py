@@ -21,6 +21,7 @@ _BLANKS: Final = re.compile(r'("(?:[^"]|"")*")|[ \t]+')
 _COMMENT: Final = ("#", "!")
 _SEPARATORS: Final = (";", "\t", ",", " ")
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+")
+_THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _NUMBER: Final = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?", re.ASCII)
 
 
@@ -91,7 +92,8 @@ def with_points(words: Sequence[str], separator: str, path: Path) -> dict[str, s
         path: of the file, for messages.
 
     Raises:
-        BadInputError: the file has decimal commas and decimal points.
+        BadInputError: the file has decimal commas and decimal points, or commas that may separate thousands: all stand
+            before three digits, and beside them are whole numbers, as if 1,234 were one too.
     """
     comma = next((word for word in words if "," in word and is_number(word)), None)
     point = next((word for word in words if "." in word and is_number(word)), None)
@@ -99,6 +101,13 @@ def with_points(words: Sequence[str], separator: str, path: Path) -> dict[str, s
         beside = f"beside {point!r}" if point is not None else "in a file that commas separate"
         raise BadInputError(
             f"{path}: the comma of {comma!r} {beside} is a decimal comma or none; write all numbers with decimal points"
+        )
+    commas = [word for word in words if "," in word and is_number(word)]
+    whole = next((word for word in words if word.lstrip("+-").isdecimal() and int(word)), None)
+    if commas and whole is not None and all(map(_THOUSANDS.fullmatch, commas)):
+        raise BadInputError(
+            f"{path}: the comma of {comma!r} beside {whole!r} may separate thousands; write all numbers with decimal "
+            "points"
         )
     return {word: word.replace(",", ".") if is_number(word) else word for word in words}
 

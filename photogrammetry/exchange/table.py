@@ -45,6 +45,7 @@ _MORE: Final[Mapping[str, frozenset[str]]] = {
     ".ior": frozenset(),
     ".eor": frozenset(f"{angle}_{unit}" for angle in ANGLES for unit in ANGLE_UNITS),
 }
+_WITH_SIGMA: Final = ("name", "x", "y", "z", "sx")
 _FEWEST_NAMED: Final = 3  # columns, in a comment that is a head
 _WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
 #: Axes of a surveyor, by what they are: X is east, Y north, Z height, which is right-handed.
@@ -196,16 +197,18 @@ def _check_unnamed(separator: str, words: Sequence[str], path: Path) -> None:
 
 
 def _check_ids(cells: Sequence[Mapping[str, str]], path: Path) -> None:
-    """Refuse lines without named columns that may begin with two names: whole numbers, then coordinates with decimals.
+    """Refuse lines without named columns that may begin with two names: whole numbers, then coordinates.
 
     Raises:
-        BadInputError: X is whole in all lines, Y and Z are in none.
+        BadInputError: X is whole in all lines and Y and Z are in none, or a line is two names and three coordinates as
+            well as a name, three coordinates and a sigma, all of them whole.
     """
     coordinates = [[each.get(column, "") for column in ("x", "y", "z")] for each in cells]
-    if all(
+    decimals = all(
         x.isdecimal() and is_number(y) and is_number(z) and not _is_whole(y) and not _is_whole(z)
         for x, y, z in coordinates
-    ):
+    )
+    if decimals or all(tuple(each) == _WITH_SIGMA and all(map(_is_whole, each.values())) for each in cells):
         raise BadInputError(
             f"{path}: the second column holds whole numbers alone and may be no coordinate; name the columns "
             "in the first line"

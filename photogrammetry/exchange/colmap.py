@@ -1,4 +1,4 @@
-"""Reads COLMAP's text model: cameras.txt, images.txt, points3D.txt.
+"""Reads COLMAP's model, text (cameras.txt, images.txt, points3D.txt) or binary (.bin).
 
 COLMAP counts pixels from the corner of the picture: the centre of the top left pixel is (0.5, 0.5). Its pose is the
 quaternion and translation from object to camera system. (colmap.github.io/format.html, cameras.html)
@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from photogrammetry.exchange.colmap_binary import text_of
 from photogrammetry.exchange.part import Part, numbers
 from photogrammetry.exchange.pinhole import Pinhole, camera_entry, pose_entry
 from photogrammetry.network.model import ImageFrame
@@ -17,7 +18,8 @@ from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.settings.strict_toml import read_text
 
-FILES: Final = ("cameras.txt", "images.txt", "points3D.txt")
+_PARTS: Final = ("cameras", "images", "points3D")
+FILES: Final = tuple(part + ending for part in _PARTS for ending in (".txt", ".bin"))
 _CORNER: Final = 0.5  # px, from COLMAP's origin to the centre of the first pixel
 #: Models that can be carried over: number of focal lengths, and what the parameters after cx, cy are.
 _MODELS: Final[Mapping[str, tuple[int, tuple[str, ...]]]] = {
@@ -40,15 +42,16 @@ def read_colmap(files: Mapping[str, Path], sigma: float) -> Part:
     Raises:
         BadInputError: a line is not as COLMAP writes it, or a camera model cannot be carried over.
     """
+    found = {part: _one_of(part, files) for part in _PARTS}
     cameras: dict[str, dict[str, Any]] = {}
     notes: list[str] = []
-    if "cameras.txt" in files:
-        for place, words in _lines(files["cameras.txt"]):
+    if found["cameras"]:
+        for place, words in _lines(found["cameras"]):
             _require_new(words[0], cameras, place)
             cameras[words[0]], said = _camera(words, place)
             notes += [f"camera {words[0]}: {note}" for note in said]
-    images, observations = _images(files["images.txt"], sigma, notes) if "images.txt" in files else ({}, [])
-    points = _points(files["points3D.txt"]) if "points3D.txt" in files else {}
+    images, observations = _images(found["images"], sigma, notes) if found["images"] else ({}, [])
+    points = _points(found["points3D"]) if found["points3D"] else {}
     if observations:
         notes.append(f"COLMAP writes no accuracy of image points: {sigma:g} px assumed (--sigma)")
         notes.append("COLMAP's object system has neither scale nor axes: add surveyed balls, or distances")
@@ -56,9 +59,27 @@ def read_colmap(files: Mapping[str, Path], sigma: float) -> Part:
     return Part(source, ImageFrame.PIXEL, cameras, images, points, observations, tuple(notes))
 
 
+def _one_of(part: str, files: Mapping[str, Path]) -> Path | None:
+    """The file of a part of the model: text or binary.
+
+    Raises:
+        BadInputError: both are there, and they may differ.
+    """
+    there = [files[name] for name in (f"{part}.txt", f"{part}.bin") if name in files]
+    if len(there) > 1:
+        raise BadInputError(
+            f"{there[0].parent}: has {part} as text and as binary; name the files of one, or remove one"
+        )
+    return there[0] if there else None
+
+
+def _text(path: Path) -> str:
+    return text_of(path) if path.suffix == ".bin" else read_text(path, "text", "COLMAP's text model")
+
+
 def _lines(path: Path) -> Iterator[tuple[str, list[str]]]:
     """Place and words of each line that is no comment."""
-    for number, line in enumerate(read_text(path, "text", "COLMAP's text model").splitlines(), start=1):
+    for number, line in enumerate(_text(path).splitlines(), start=1):
         if line.strip() and not line.startswith("#"):
             yield f"{path}: line {number}", line.split()
 
@@ -101,7 +122,7 @@ def _images(path: Path, sigma: float, notes: list[str]) -> tuple[dict[str, dict[
     images: dict[str, dict[str, Any]] = {}
     rows: list[list[Any]] = []
     twice = 0
-    lines = enumerate(read_text(path, "text", "COLMAP's text model").splitlines(), start=1)
+    lines = enumerate(_text(path).splitlines(), start=1)
     for number, line in lines:
         if not line.strip() or line.startswith("#"):
             continue

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from photogrammetry.exchange.camera_toml import read_camera_toml
 from photogrammetry.exchange.colmap import FILES, read_colmap
 from photogrammetry.exchange.columns import read_aicon, read_survey_csv
 from photogrammetry.exchange.opencv import read_opencv
@@ -32,7 +33,8 @@ def import_network(
     """Carry files over into a network.
 
     Args:
-        files: COLMAP's folder or text files, calibrations of OpenCV, exports of PhotoModeler, files of AICON, surveys.
+        files: COLMAP's folder or files, calibrations of OpenCV and of anipose (TOML), exports of PhotoModeler, files of
+            AICON, surveys.
         sigma: of image points (px) whose file gives none.
         sigma_mm: likewise in files that count in mm.
         length_unit: of the object system.
@@ -53,7 +55,7 @@ def _parts(files: Sequence[Path], sigma: float, sigma_mm: float | None) -> Itera
         if path.is_dir():
             inside = {name: path / name for name in FILES if (path / name).exists()}
             if not inside:
-                raise BadInputError(f"{path}: has none of {', '.join(FILES)}; export COLMAP's model as text")
+                raise BadInputError(f"{path}: has none of {', '.join(FILES)}; name the folder of COLMAP's model")
             models.setdefault(folder, {}).update(inside)
         elif path.name in FILES:
             models.setdefault(folder, {})[path.name] = path
@@ -67,11 +69,13 @@ def _part(path: Path, sigma: float, sigma_mm: float | None) -> Part:
     ending = path.suffix.lower()
     if ending in _OPENCV:
         return read_opencv(path, sigma)
+    if ending == ".toml":
+        return read_camera_toml(path)
     if ending == ".csv":
         return read_survey_csv(path)
     if ending in ENDINGS:
         return read_aicon(path, sigma_mm)
     if ending == ".txt":
         return read_photomodeler(path, sigma)
-    known = ", ".join((".txt", *_OPENCV, *ENDINGS))
+    known = ", ".join((".txt", ".toml", *_OPENCV, *ENDINGS))
     raise BadInputError(f"{path}: nothing is known that is called so; endings are {known}, or a folder of COLMAP")

@@ -26,6 +26,7 @@ _DISTORTION: Final = ("distortioncoefficients", "distcoeffs", "distcoeff", "dist
 _WIDTH: Final = ("imagewidth", "width")
 _HEIGHT: Final = ("imageheight", "height")
 _SIZE: Final = ("imagesize", "size", "resolution")
+_POSE: Final = ("rvec", "tvec")  # of the only image of the camera
 _BOARD: Final = ("imagepoints", "gridpoints", "extrinsicparameters")
 #: Keys that name the lens model, and the models that are OpenCV's radial and decentring distortion.
 _MODEL: Final = ("distortionmodel", "cameramodel", "lensmodel", "model", "fisheyemodel", "fisheye")
@@ -65,6 +66,7 @@ def read_opencv(path: Path, sigma: float) -> Part:
     if values.first(_DISTORTION) is None:
         notes.append(f"camera {name}: no distortion in {path.name}")
     images, points, observations = _board(values, name, sigma)
+    images |= _single(values, name)
     if observations:
         notes.append(f"camera {name}: OpenCV writes no accuracy of image points: {sigma:g} px assumed (--sigma)")
         notes.append(f"camera {name}: the board's points are unknown (tie), not plane by definition; add a distance")
@@ -136,7 +138,7 @@ def _require_understood(values: _Values) -> None:
             raise BadInputError(
                 f'{values.path}: key "{values.written[key]}": a part of the picture cannot be carried over; remove it'
             )
-    known = {*_MATRIX, *_DISTORTION, *_WIDTH, *_HEIGHT, *_SIZE, *_BOARD, *_MODEL, *_PARTS, *_HARMLESS}
+    known = {*_MATRIX, *_DISTORTION, *_WIDTH, *_HEIGHT, *_SIZE, *_POSE, *_BOARD, *_MODEL, *_PARTS, *_HARMLESS}
     for small, key in values.written.items():
         if small not in known:
             raise BadInputError(
@@ -225,6 +227,17 @@ def _size(values: _Values) -> tuple[int, int]:
     if np.any(size != np.round(size)):
         raise BadInputError(f"{path}: an image size of {size[0]:g} x {size[1]:g} px is none; correct it")
     return int(size[0]), int(size[1])
+
+
+def _single(values: _Values, camera: str) -> dict[str, dict[str, Any]]:
+    """The image whose pose stands beside the camera, called as the camera; none without a pose."""
+    turn, shift = (values.numbers(key) for key in _POSE)
+    if turn is None and shift is None:
+        return {}
+    if turn is None or shift is None or turn.size != 3 or shift.size != 3:
+        raise BadInputError(f'{values.path}: a pose is "rvec" and "tvec", three numbers each; correct them there')
+    pose = pose_entry(rotation_from_vector(turn.ravel()), shift.ravel())
+    return {camera: {"camera": camera, **pose}}
 
 
 def _board(

@@ -7,19 +7,24 @@ file, results. `svev` is the program of this checkout.
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
 from bench.analysis.hill_logs import write_hill_log
 from rig.settings.file import CONFIG
 from simrig.world.scenario import load_scenario
+from tests.reader_files import PREPARED
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
+from tests.support.waiting import wait_until
 from tests.test_docs import FENCE, PAGES, ROOT
 
 #: What is not run, by the beginning of the command, and why.
@@ -28,18 +33,18 @@ NOT_RUN: Final = {
     r"sudo |printf .*\| sudo|su -|apt |adduser |exit$|systemctl ": "changes the computer, as root",
     r"git clone |cd svev|source \.venv|tar xf ": "the checkout and the bundle: .ci/try-wheel, tests/systemd",
     r"rsync ": "needs another computer",
-    r"svev setup": "asks a person: tests/svev/setup",
+    r"svev setup": "asks a person: tests/svev/setup answers it at a terminal",
     r"svev cameras ": "needs a camera on a network port: tests/svev/test_cameras.py",
     r"svev doctor --bus firewire": "needs a FireWire card",
     r"svev demo --bus firewire": "tests/svev/test_demo.py runs it",
-    r"svev serve |svev worker |svev digitize |svev ctl log": "goes on until it is stopped: tests/service, analysis",
-    r"svev calibrate --pictures": "needs pictures of targets: tests/svev/test_calibrate_pictures.py",
-    r"svev merge ": "needs logs of two computers: tests/recorder/merging",
-    r"svev import A=|svev import left\.avi": "needs films of other cameras: tests/recorder/importing",
-    r"svev compare ": "needs results of three recordings: tests/svev/test_compare.py",
+    r"svev worker |svev ctl log": "goes on until it is stopped: tests/service, analysis",
     r"svev analyze old\.mcap": "needs a survey of cameras of those names: tests/recorder/importing",
     r"svev season |dask ": "needs the logs of a season, or a cluster that goes on: tests/season",
-    r"svev network import ": "needs files of other programs: tests/photogrammetry/exchange",
+}
+#: Commands that go on until somebody stops them, and what they say when they are ready.
+GOES_ON: Final = {
+    r"svev serve ": "svev: panel at ",
+    r"svev digitize ": "svev: measure at ",
 }
 #: Commands that record at 30 Hz: on a busy computer frames are missing, and exit code 3 says so.
 _KEEPS_TIME: Final = re.compile(r"svev (doctor|rehearse|record|verify trial/|analyze trial/)")
@@ -53,6 +58,10 @@ def _commands(page: Path) -> list[str]:
 
 def _why_not(command: str) -> str | None:
     return next((why for pattern, why in NOT_RUN.items() if re.match(pattern, command)), None)
+
+
+def _goes_on(command: str) -> str | None:
+    return next((ready for pattern, ready in GOES_ON.items() if re.match(pattern, command)), None)
 
 
 def _asks_the_service(command: str) -> bool:
@@ -70,10 +79,10 @@ def _pages(*, asking: bool) -> list[Path]:
 
 def test_every_reason_is_needed_and_most_commands_run() -> None:
     commands = [command for page in PAGES for command in _commands(page)]
-    for pattern in NOT_RUN:
+    for pattern in (*NOT_RUN, *GOES_ON):
         assert any(re.match(pattern, command) for command in commands), f"no page has a command like {pattern}"
     of_svev = [command for command in commands if command.startswith("svev ")]
-    assert len([command for command in of_svev if _why_not(command) is None]) > 40
+    assert len([command for command in of_svev if _why_not(command) is None]) > 60
 
 
 def test_blocks_with_commands_are_shell_blocks() -> None:
@@ -100,22 +109,62 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _run(folder: Path, command: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a command of a page in its folder."""
+def _environment(folder: Path) -> dict[str, str]:
+    """In which `svev` is that of this checkout."""
     program = folder / "bin" / "svev"
     if not program.exists():
         program.parent.mkdir()
         program.write_text(f'#!/bin/sh\nexec {sys.executable} -m svev "$@"\n')
         program.chmod(0o755)
-    place = {"PATH": f"{program.parent}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+    return {**os.environ, "PATH": f"{program.parent}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+
+
+def _run(folder: Path, command: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a command of a page in its folder."""
     return subprocess.run(
         ["/bin/bash", "-c", command],
         cwd=folder,
-        env={**os.environ, **place, **environment},
+        env={**_environment(folder), **environment},
         capture_output=True,
         text=True,
         check=False,
     )
+
+
+def _run_until_ready(folder: Path, command: str, ready: str, beside: str = "", **environment: str) -> None:
+    """Run a command of a page that goes on, and stop it, as with Ctrl-C, when it has said that it is ready.
+
+    Args:
+        folder: of the reader.
+        command: of the page.
+        ready: what it says then.
+        beside: another command, that runs meanwhile.
+        environment: more of it.
+    """
+    said = folder / "said.txt"
+    place = {**_environment(folder), **environment}
+    with ExitStack() as stack:
+        output = stack.enter_context(said.open("w"))
+        asked = ["/bin/bash", "-c", f"exec {command}"]
+        process = stack.enter_context(_ended(asked, cwd=folder, env=place, stdout=output, stderr=output))
+        if beside:
+            other = ["/bin/bash", "-c", f"exec {beside}"]
+            stack.enter_context(_ended(other, cwd=folder, env=place, stdout=subprocess.DEVNULL))
+        wait_until(lambda: ready in said.read_text() or process.poll() is not None, f"{command}: {ready}", 120, 0.1)
+        assert process.poll() is None, said.read_text()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) in {0, 130}, said.read_text()
+
+
+@contextmanager
+def _ended(command: list[str], **options: Any) -> Iterator["subprocess.Popen[bytes]"]:
+    """A process that does not outlive this."""
+    with subprocess.Popen(command, **options) as process:
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.kill()
 
 
 @pytest.fixture
@@ -140,15 +189,34 @@ def place(recorded: Path, tmp_path: Path, loopback: Loopback) -> Path:
 @pytest.mark.long
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("page", _pages(asking=False), ids=lambda page: page.stem)
-def test_the_commands_of_a_page_run(page: Path, place: Path, recorded: Path) -> None:
+def test_the_commands_of_a_page_run(page: Path, place: Path, recorded: Path, loopback: Loopback) -> None:
+    for write in PREPARED.get(page.stem, ()):
+        write(place)
     for command in _commands(page):
         if _why_not(command) is not None or _asks_the_service(command):
+            continue
+        if (ready := _goes_on(command)) is not None:
+            its, beside = _at_own_addresses(command, loopback)
+            _run_until_ready(place, its, ready, beside)
             continue
         if "poses.json" in command and "-o poses.json" not in command and not (place / "poses.json").exists():
             shutil.copy(recorded / "poses.json", place)  # of another page
         done = _run(place, re.sub(r"\bLOG\b", "jump.mcap", command))
         allowed = {0, 3} if _KEEPS_TIME.match(command) else {0}
         assert done.returncode in allowed, f"{command}\n{done.stdout}\n{done.stderr}"
+
+
+def _at_own_addresses(command: str, loopback: Loopback) -> tuple[str, str]:
+    """A command that goes on, at addresses where no test beside this one is, and the command that runs beside it."""
+    if command.startswith("svev serve "):
+        at = f"--host {loopback.host} --port {loopback.free_port()}"
+        return f"{re.sub(r'--host [0-9.]+', '', command)} {at}", ""
+    if command.startswith("svev worker "):
+        address = loopback.endpoint()
+        its = command.replace("tcp://127.0.0.1:5556", address)
+        assert its != command
+        return f"{its} --bind {loopback.endpoint()}", f"svev replay jump.mcap --bind {address} --wait 60"
+    return command, ""
 
 
 @pytest.mark.long
@@ -167,6 +235,9 @@ def test_the_commands_of_a_page_run_beside_the_service(page: Path, tmp_path: Pat
             if re.match(r"svev ctl (start|save) ", command):  # another example, not what follows the one before
                 _end_recording(service)
             its = re.sub(r"\d{4}-\d\d-\d\dT[\d-]+Z", recording, command).replace("http://127.0.0.1:8000", service.url)
+            if (ready := _goes_on(command)) is not None:
+                _run_until_ready(tmp_path, its, ready, SVEV_URL=service.url)
+                continue
             done = _run(tmp_path, its, SVEV_URL=service.url)
             assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
 

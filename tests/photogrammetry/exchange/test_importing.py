@@ -5,14 +5,12 @@ import random
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from photogrammetry.exchange.importing import import_network
-from photogrammetry.exchange.part import rotation_of
 from photogrammetry.geometry.camera_model import image_point
 from photogrammetry.network.file import read_network
 from photogrammetry.network.file_writer import metric_to_pixel
@@ -20,9 +18,18 @@ from photogrammetry.network.model import Network, Role
 from rig.arrays import Floats
 from rig.errors import BadInputError
 from svev.cli import main
+from tests.photogrammetry.exchange.written import (
+    AICON,
+    AICON_ROTATION,
+    SIZE,
+    coordinates,
+    photomodeler_text,
+    write_aicon,
+    write_colmap,
+    write_opencv,
+)
 from tests.photogrammetry.synthetic import hill
 
-SIZE = np.array([640, 480])
 K = np.array([[1420.0, 0.0, 325.5], [0.0, 1420.0, 231.25], [0.0, 0.0, 1.0]])
 D = np.array([-0.31, 0.22, 0.0013, -0.0007, 0.4])
 XYZ = np.random.default_rng(1).uniform((-0.75, -0.5, 3.6), (0.75, 0.5, 4.4), (60, 3))  # as the camera sees it
@@ -37,18 +44,6 @@ def _projected(network: Network, xyz: Floats, camera: int = 0) -> Floats:
     assert image.rotation is not None
     lens = network.cameras[camera].lens()
     return metric_to_pixel(np.asarray(image_point(lens, image.rotation, image.position, xyz)), SIZE)
-
-
-def _opencv(path: Path, matrix: Floats, coefficients: Floats, **more: Any) -> Path:
-    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
-    storage.write("image_width", 640)
-    storage.write("image_height", 480)
-    storage.write("camera_matrix", matrix)
-    storage.write("distortion_coefficients", coefficients)
-    for key, value in more.items():
-        storage.write(key, value)
-    storage.release()
-    return path
 
 
 @pytest.mark.parametrize("ending", [".yml", ".json"])
@@ -71,7 +66,7 @@ def test_opencv_projects_the_same(
     assert ((expected > 0.0) & (expected < SIZE)).all()
     pose = np.concatenate((TURN, SHIFT))[None]
     board = {"extrinsic_parameters": pose, "image_points": expected[None], "grid_points": xyz[:, None]}
-    path = _opencv(tmp_path / f"K1{ending}", matrix, coefficients, **board)
+    path = write_opencv(tmp_path / f"K1{ending}", matrix, coefficients, **board)
     imported = import_network([path], sigma=0.2)
     assert np.abs(_projected(imported.network, xyz) - expected).max() < within_px
     lost = [float(n) for note in imported.notes for n in re.findall(r"differ from OpenCV's by up to (\S+) px", note)]
@@ -86,13 +81,13 @@ def test_opencv_projects_the_same(
 def test_what_opencv_has_and_the_network_not_is_refused(tmp_path: Path) -> None:
     prism = np.append(np.zeros(8), [1e-3, 0.0, 0.0, 0.0])
     with pytest.raises(BadInputError, match="thin prism and tilted sensor cannot be carried over"):
-        import_network([_opencv(tmp_path / "prism.yml", K, prism)])
+        import_network([write_opencv(tmp_path / "prism.yml", K, prism)])
     with pytest.raises(BadInputError, match="fisheye"):
-        import_network([_opencv(tmp_path / "fish.yml", K, D[:4], fisheye_model=1)])
+        import_network([write_opencv(tmp_path / "fish.yml", K, D[:4], fisheye_model=1)])
     (tmp_path / "none.yml").write_text("%YAML:1.0\n---\nimage_width: 640\n")
     with pytest.raises(BadInputError, match="no 3 x 3 matrix"):
         import_network([tmp_path / "none.yml"])
-    text = _opencv(tmp_path / "size.yml", K, D).read_text().replace("image_width", "other")
+    text = write_opencv(tmp_path / "size.yml", K, D).read_text().replace("image_width", "other")
     (tmp_path / "size.yml").write_text(text)
     with pytest.raises(BadInputError, match="image size is missing"):
         import_network([tmp_path / "size.yml"])
@@ -102,7 +97,7 @@ def test_calibrations_and_surveyed_balls_are_a_survey_for_logs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name in ("K1", "K2"):
-        _opencv(tmp_path / f"{name}.yml", K, D)
+        write_opencv(tmp_path / f"{name}.yml", K, D)
     (tmp_path / "balls.csv").write_text("Name;X;Y;Z;Sigma\nB1;0,523;-2,874;-1,871;0,012\nB2;1;2;3;0,02\n")
     (tmp_path / "more.csv").write_text("B3,1,2,3,0.01,0.02,0.03\n# measured on Tuesday\nB4,1,2.5,3,0.01,0.02,0.03\n")
     files = [str(tmp_path / name) for name in ("K1.yml", "K2.yml", "balls.csv", "more.csv")]
@@ -118,48 +113,9 @@ def test_calibrations_and_surveyed_balls_are_a_survey_for_logs(
     assert third.sigma == pytest.approx([0.01, 0.02, 0.03])
 
 
-def _quaternion(rotation: Floats) -> Floats:
-    """w, x, y, z of a rotation by less than a half turn."""
-    vector = cv2.Rodrigues(rotation)[0].ravel()
-    angle = np.linalg.norm(vector)
-    return np.append(np.cos(angle / 2.0), np.sin(angle / 2.0) * vector / angle)
-
-
-def _colmap(
-    folder: Path, network: Network, model: str = "OPENCV 640 480 {c} {c} {cx} {cy} -0.01 0.02 1e-4 2e-4"
-) -> Path:
-    """COLMAP's text files of a network: the reverse of the import, written down from COLMAP's own page."""
-    folder.mkdir()
-    cameras = [
-        f"{i} {model}".format(c=camera.interior[0], cx=320.0 + camera.interior[1], cy=240.0 - camera.interior[2])
-        for i, camera in enumerate(network.cameras, start=1)
-    ]
-    (folder / "cameras.txt").write_text("# Camera list\n" + "\n".join(cameras) + "\n")
-    lines, o = ["# Image list"], network.observations
-    for i, image in enumerate(network.images):
-        assert image.rotation is not None
-        down = image.rotation.T * np.array([[1.0], [-1.0], [-1.0]])
-        pose = [*_quaternion(down), *(-down @ image.position)]
-        pixels = metric_to_pixel(o.xy[o.image == i], SIZE) + 0.5
-        points = zip(pixels, o.point[o.image == i], strict=True)
-        seen = " ".join(f"{xy[0]!r} {xy[1]!r} {point + 7}" for xy, point in points)
-        lines += [
-            f"{i + 1} {' '.join(map(repr, map(float, pose)))} {image.camera + 1} {image.name}.jpg",
-            f"1.5 2.5 -1 {seen}",
-        ]
-    (folder / "images.txt").write_text("\n".join(lines).replace("np.float64(", "").replace(")", "") + "\n")
-    xyz = [f"{i + 7} {x!r} {y!r} {z!r} 255 0 0 0.5 1 2" for i, (x, y, z) in enumerate(_xyz(network).tolist())]
-    (folder / "points3D.txt").write_text("\n".join(xyz) + "\n")
-    return folder
-
-
-def _xyz(network: Network) -> Floats:
-    return np.array([np.zeros(3) if point.xyz is None else point.xyz for point in network.points])
-
-
 def test_a_colmap_model_comes_back_as_it_was(tmp_path: Path) -> None:
     network = hill(1).network
-    imported = import_network([_colmap(tmp_path / "model", network)], sigma=0.4)
+    imported = import_network([write_colmap(tmp_path / "model", network)], sigma=0.4)
     again = imported.network
     for before, after in zip(network.images, again.images, strict=True):
         assert after.name == f"{before.name}.jpg"
@@ -168,14 +124,14 @@ def test_a_colmap_model_comes_back_as_it_was(tmp_path: Path) -> None:
         assert after.rotation == pytest.approx(np.asarray(before.rotation), abs=1e-12)
     assert again.observations.xy == pytest.approx(network.observations.xy, abs=1e-9)
     assert [again.points[i].name for i in again.observations.point] == [str(i + 7) for i in network.observations.point]
-    assert _xyz(again) == pytest.approx(_xyz(network), abs=1e-12)
+    assert coordinates(again) == pytest.approx(coordinates(network), abs=1e-12)
     assert any("0.4 px assumed" in note for note in imported.notes)
     assert any("neither scale nor axes" in note for note in imported.notes)
 
 
 def test_colmap_projects_as_opencv_does(tmp_path: Path) -> None:
     """COLMAP's OPENCV model is OpenCV's, with pixels counted from the corner."""
-    network = import_network([_colmap(tmp_path / "model", hill(1).network)]).network
+    network = import_network([write_colmap(tmp_path / "model", hill(1).network)]).network
     image = network.images[0]
     assert image.rotation is not None
     down = image.rotation.T * np.array([[1.0], [-1.0], [-1.0]])
@@ -189,41 +145,10 @@ def test_colmap_projects_as_opencv_does(tmp_path: Path) -> None:
     assert np.abs(_projected(network, xyz) - expected).max() < 1e-9
 
 
-def _photomodeler(network: Network) -> str:
-    """A text export, from the layout in the docstring of the reader."""
-    size = (7.2, 5.4)  # mm; a pixel is 0.01125 mm
-    scale = size[0] / 640.0
-    text = [
-        "Bundle Soln test",
-        " 0.0005 20 640 480",
-        " 1 1 1 1 1 1 1 1 1",
-        " 7 3.6 2.7 7.2 5.4 0 0 0 0 0",
-        " 0 0 0 0 0 0 0 0 0 0",
-    ]
-    for i, image in enumerate(network.images):
-        r = np.asarray(image.rotation)
-        angles = (np.arctan2(-r[0, 1], r[0, 0]), np.arcsin(r[0, 2]), np.arctan2(-r[1, 2], r[2, 2]))
-        interior = network.cameras[image.camera].interior
-        inner = [interior[0] * scale, 3.6 + 0.05, 2.7 - 0.02, *size, 2e-4, 0.0, 0.0, 1e-5, -2e-5]
-        text += [f"  {i} C:\\photos\\{image.name}.JPG", _row(i, *np.asarray(image.position), *np.degrees(angles))]
-        text += [_row(i, *[0.001] * 6), "", _row(i, *inner), _row(i, *[0.0] * 10)]
-    surveyed = [p for p in network.points if p.role is Role.CONTROL]
-    text += ["", *(_row(p.name, *np.asarray(p.xyz), *np.asarray(p.sigma)) for p in surveyed)]
-    text += ["", *(_row(p.name, *np.asarray(p.xyz), 0.1, 0.1, 0.1) for p in network.points), ""]
-    o = network.observations
-    for i, p, xy in zip(o.image, o.point, o.xy, strict=True):
-        text.append(_row(i, network.points[p].name, xy[0] + 320.0, 240.0 - xy[1], 0.33, 0.0))
-    return "\n".join(text).replace("B", "10").replace("T", "20").replace("10undle", "Bundle") + "\n"
-
-
-def _row(*values: Any) -> str:
-    return " ".join(value if isinstance(value, str) else repr(float(value)) for value in values).replace(".0 ", " ", 1)
-
-
 def test_a_photomodeler_export_comes_back_as_it_was(tmp_path: Path) -> None:
     network = hill(1).network
     path = tmp_path / "export.txt"
-    path.write_text(_photomodeler(network))
+    path.write_text(photomodeler_text(network))
     again = import_network([path], sigma=0.5).network
     assert [image.name for image in again.images] == [image.name for image in network.images]
     for before, after in zip(network.images, again.images, strict=True):
@@ -258,30 +183,13 @@ def test_photomodelers_camera_is_that_of_a_published_calibration(tmp_path: Path)
     assert np.degrees(np.arctan2(-r[0, 1], r[0, 0])) == pytest.approx(figures["angles_deg.1.kappa"]["value"])
 
 
-_ROTATION = rotation_of(0.3, -0.2, 1.1)
-AICON = {
-    "cams.ior": "# camera c x0 y0 a1 a2 r0 a3 b1 b2 c1 c2\n"
-    "7 -28.5 0.05 -0.03 -1.0e-4 1.5e-7 9.5 0 1e-6 2e-6 1e-4 -2e-4\n",
-    "poses.eor": "# image camera X0 Y0 Z0 omega_gon phi_gon kappa_gon\n"
-    f"1 7 1.0 2.0 3.0 {0.3 * 200 / np.pi} {-0.2 * 200 / np.pi} {1.1 * 200 / np.pi}\n2 7 4 5 6 0 0 0\n",
-    "points.phc": "1 T1 1.25 -2.5 0.001 0.002\n2 T1 1.5 2.5 0.001 0.002\n1 T2 0 0 0.001 0.001\n",
-    "points.obc": "T1 1 2 -8 0.01 0.01 0.02\nT2 0.5 0.5 -9\n",
-}
-
-
-def _aicon(folder: Path, **other: str) -> list[Path]:
-    for name, text in (AICON | other).items():
-        (folder / name).write_text(text)
-    return [folder / name for name in AICON]
-
-
 def test_files_of_aicon(tmp_path: Path) -> None:
-    network = import_network(_aicon(tmp_path)).network
+    network = import_network(write_aicon(tmp_path)).network
     (camera,) = network.cameras
     assert camera.interior.tolist() == [28.5, 0.05, -0.03, -1.0e-4, 1.5e-7, 0.0, 1e-6, 2e-6, 1e-4, -2e-4]
     assert (camera.balance, camera.distortion.value) == (9.5, "measured")
     first, second = network.images
-    assert first.rotation == pytest.approx(_ROTATION)
+    assert first.rotation == pytest.approx(AICON_ROTATION)
     assert second.position == pytest.approx([4.0, 5.0, 6.0])
     assert network.observations.xy.tolist() == [[1.25, -2.5], [1.5, 2.5], [0.0, 0.0]]
     assert network.observations.sigma.tolist() == [[0.001, 0.002], [0.001, 0.002], [0.001, 0.001]]
@@ -295,14 +203,20 @@ def _refused(files: Callable[[], list[Path]], pattern: str) -> None:
 
 
 def test_what_does_not_fit_together_is_refused(tmp_path: Path) -> None:
-    _refused(lambda: _aicon(tmp_path, **{"points.phc": "1 T1 1.25 -2.5\n"}), "line 1: sigma is missing; .*--sigma-mm")
+    _refused(
+        lambda: write_aicon(tmp_path, **{"points.phc": "1 T1 1.25 -2.5\n"}), "line 1: sigma is missing; .*--sigma-mm"
+    )
     two = AICON["cams.ior"] + "8 -20 0 0\n"
-    _refused(lambda: _aicon(tmp_path, **{"cams.ior": two})[::2], "which of 2 cameras took image '1'")
-    _refused(lambda: [*_aicon(tmp_path), _opencv(tmp_path / "K1.yml", K, D)], "counts in pixels and .* in millimetres")
-    _refused(lambda: _aicon(tmp_path, **{"points.obc": "T1 1 x -8\n"}), "line 1, column y: 'x' is no number")
+    _refused(lambda: write_aicon(tmp_path, **{"cams.ior": two})[::2], "which of 2 cameras took image '1'")
+    _refused(
+        lambda: [*write_aicon(tmp_path), write_opencv(tmp_path / "K1.yml", K, D)],
+        "counts in pixels and .* in millimetres",
+    )
+    _refused(lambda: write_aicon(tmp_path, **{"points.obc": "T1 1 x -8\n"}), "line 1, column y: 'x' is no number")
     wide = "1 7 1 2 3 0.1 0.2 0.3\n"
     _refused(
-        lambda: _aicon(tmp_path, **{"poses.eor": wide}), "8 columns, but only image, camera.* name them in the first"
+        lambda: write_aicon(tmp_path, **{"poses.eor": wide}),
+        "8 columns, but only image, camera.* name them in the first",
     )
     (tmp_path / "a.csv").write_text("B1,1.0,2,3\n")
     _refused(lambda: [tmp_path / "a.csv"], "line 1: sigma is missing")
@@ -312,7 +226,7 @@ def test_what_does_not_fit_together_is_refused(tmp_path: Path) -> None:
     _refused(lambda: [tmp_path / "c.xyz"], "endings are")
     (tmp_path / "d.txt").write_text("something else\n")
     _refused(lambda: [tmp_path / "d.txt"], "is no text export of PhotoModeler")
-    model = _colmap(tmp_path / "model", hill(1).network, "OPENCV_FISHEYE 640 480 1 1 1 1 0 0 0 0")
+    model = write_colmap(tmp_path / "model", hill(1).network, "OPENCV_FISHEYE 640 480 1 1 1 1 0 0 0 0")
     _refused(lambda: [model], "OPENCV_FISHEYE cannot be carried over")
     (model / "cameras.txt").write_text("1 SIMPLE_RADIAL 640 480 1 320 240 1e300\n")
     _refused(lambda: [model], "line 1: the distortion .*calibrate again")
@@ -324,7 +238,7 @@ def test_what_does_not_fit_together_is_refused(tmp_path: Path) -> None:
 def test_the_imported_is_adjusted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """COLMAP's model with the survey of its points: the command, then the adjustment."""
     network = hill(1).network
-    model = _colmap(tmp_path / "model", network, "SIMPLE_PINHOLE 640 480 {c} {cx} {cy}")
+    model = write_colmap(tmp_path / "model", network, "SIMPLE_PINHOLE 640 480 {c} {cx} {cy}")
     balls = [
         f"{i + 7},{','.join(map(str, p.xyz))},0.012"
         for i, p in enumerate(network.points)
@@ -364,13 +278,13 @@ def test_a_spoilt_file_is_read_or_refused_in_one_line(kind: str, tmp_path: Path)
     """Words exchanged, lost and added at random; never a crash, and never a warning of numpy."""
     network, chance = hill(1).network, random.Random(kind)
     board = {"extrinsic_parameters": np.ones((2, 6)), "image_points": np.ones((2, 3, 2))}
-    (tmp_path / "export.txt").write_text(_photomodeler(network))
+    (tmp_path / "export.txt").write_text(photomodeler_text(network))
     (tmp_path / "balls.csv").write_text("name,X,Y,Z,sigma\nB1,1,2,3,0.1\nB2,1,2,4,0.1\n")
     files = {
-        "colmap": list(_colmap(tmp_path / "model", network).iterdir()),
+        "colmap": list(write_colmap(tmp_path / "model", network).iterdir()),
         "photomodeler": [tmp_path / "export.txt"],
-        "opencv": [_opencv(tmp_path / "K1.yml", K, D, **board)],
-        "aicon": _aicon(tmp_path),
+        "opencv": [write_opencv(tmp_path / "K1.yml", K, D, **board)],
+        "aicon": write_aicon(tmp_path),
         "survey": [tmp_path / "balls.csv"],
     }[kind]
     said = []

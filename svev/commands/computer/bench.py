@@ -54,7 +54,9 @@ def bench(
     pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all measurements and with a marker or a
     ski missing for a while; about two seconds a draw. gross-errors: hills with exchanged names, wrong survey, wrong
     image points or wrong units: what the search for gross errors makes of them. pairing: triplets mixed, not found and
-    invented under clocks that are set and rates that the rig file does not name.
+    invented under clocks that are set and rates that the rig file does not name. digitizing: measuring by hand over
+    HTTP with nothing and with 100 000 points marked, from a click to its sigma, from the pointer to the curves, a step
+    to another pulse; processor times beside, which other programs change little.
 
     Example: svev bench saturated --seconds 10
     """

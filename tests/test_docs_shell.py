@@ -39,7 +39,8 @@ NOT_RUN: Final = {
     r"svev demo --bus firewire": "tests/svev/test_demo.py runs it",
     r"svev worker |svev ctl log": "goes on until it is stopped: tests/service, analysis",
     r"svev analyze old\.mcap": "needs a survey of cameras of those names: tests/recorder/importing",
-    r"svev season |dask ": "needs the logs of a season, or a cluster that goes on: tests/season",
+    r"dask |svev season run .* --scheduler": "needs a cluster that goes on: tests/season",
+    r"svev season compare ": "needs thirty good jumps: tests/season/test_mixed_effects.py",
 }
 #: Commands that go on until somebody stops them, and what they say when they are ready.
 GOES_ON: Final = {

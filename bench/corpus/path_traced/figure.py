@@ -2,7 +2,8 @@
 
 Markers are thin plates: helmet and hip lie on the surface of the body, towards the cameras, so that the body stands
 behind them; those of the skis stand upright on the ski line before the toes of the boots, where the ski is no more than
-a rod. The centre of each plate is the marker's place in the truth.
+a rod. The centre of each plate is the marker's place in the truth. In some scenes that of the hip has a dark patch
+around it, in the others the suit.
 """
 
 import math
@@ -16,6 +17,7 @@ from simrig.world.jumper import Pose
 from simrig.world.scenario import Jumper
 
 MARKER_THICK_M: Final = 0.006
+_PATCH: Final = 1.6  # radii of a marker
 _CLEAR_M: Final = 0.01  # between a marker's plate and the body behind it
 _HELMET_M, _PELVIS_M = 0.13, 0.155
 _HEAD_M: Final = 0.19  # from the middle of the helmet to the neck
@@ -45,10 +47,11 @@ class Figure:
         jumper: its settings.
         towards: unit direction from the jumper to the cameras that shall see its markers, shape (3,).
         bend_m: by how much the middle of a ski lies below its ends.
+        patched: whether the hip has a patch around its marker.
     """
 
-    def __init__(self, jumper: Jumper, towards: Floats, bend_m: float) -> None:
-        self._jumper, self._towards = jumper, towards
+    def __init__(self, jumper: Jumper, towards: Floats, bend_m: float, patched: bool) -> None:
+        self._jumper, self._towards, self._patched = jumper, towards, patched
         self.meshes: dict[str, tuple[Mesh, tuple[str, ...]]] = {
             "trunk": (limb(_LENGTHS["trunk"], (0.12, 0.122, 0.13, 0.15, 0.165, 0.15, 0.09), 0.72), ("suit",)),
             "pelvis": (ellipsoid(_PELVIS_M, _PELVIS_M, _PELVIS_M), ("suit",)),
@@ -64,6 +67,7 @@ class Figure:
             "shaft": (limb(_LENGTHS["shaft"], (0.055, 0.058, 0.06)), ("boot",)),
             "ski": (_ski(jumper.ski_length_m, bend_m, jumper.marker_radius_m), ("ski", "print")),
             "marker": (disc(jumper.marker_radius_m, MARKER_THICK_M), ("marker",)),
+            "patch": (disc(_PATCH * jumper.marker_radius_m, MARKER_THICK_M / 3), ("patch",)),
         }
 
     def joints(self, pose: Pose) -> Floats:
@@ -128,6 +132,10 @@ class Figure:
         upright = np.array((0.0, 0.0, 1.0))
         plates = zip(pose.markers, self._faces(pose), worn, strict=True)
         ends |= {f"P{i} marker": (X, X + face, upright) for i, (X, face, on) in enumerate(plates, 1) if on}
+        if self._patched and worn[1]:
+            face = self._faces(pose)[1]
+            behind = pose.markers[1] - MARKER_THICK_M * face
+            ends["P2 patch"] = (behind, behind + face, upright)
         meshes = {name: next(mesh for mesh in self.meshes if name.endswith(mesh)) for name in ends}
         return {name: (meshes[name], _between(*of, _LENGTHS.get(meshes[name]))) for name, of in ends.items()}
 

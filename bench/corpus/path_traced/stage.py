@@ -27,6 +27,7 @@ _AROUND_M: Final = 0.35  # rendered about the joints
 _ALBEDO: Final = 0.85  # of white
 _OVERCAST: Final = 0.9  # radiance of the sky without a sun
 _ON_PLATE: Final = 40  # points whose sight decides which share of a marker is seen
+_PATCHED: Final = 0.5  # share of the scenes in which the hip has a dark patch around its marker
 _BEND_M: Final = 0.012  # of the skis, standard deviation
 
 #: Albedo, contrast and grain (m) of the texture, height of the bumps (m), share of gloss, roughness of the surfaces.
@@ -67,7 +68,9 @@ class Stage:
         jumping = [state for state in states.values() if state["jumper_present"]]
         path = np.array([state["origin"] for state in jumping])
         facing = towards(list(self._cameras.values()), path.mean(axis=0))
-        self._figure = Figure(scenario.jumper, facing, float(self._rng.normal(0, _BEND_M)))
+        self._figure = Figure(
+            scenario.jumper, facing, float(self._rng.normal(0, _BEND_M)), bool(self._rng.random() < _PATCHED)
+        )
         self.scenery = Scenery(scenario, list(self._cameras.values()), path, self._rng)
         self.told = self._description()
 
@@ -198,6 +201,7 @@ class Stage:
             "marker": (_ALBEDO * jumper.marker / BRIGHTEST, 0.05, 0.02, 0.0, 0.0, 0.9),
             "suit": (_ALBEDO * jumper.suit / BRIGHTEST, 0.15, 0.12, 0.03, 0.0, 0.7),
             "helmet": (_ALBEDO * jumper.patch / BRIGHTEST, 0.1, 0.3, 0.0, 0.05, 0.3),
+            "patch": (_ALBEDO * jumper.patch / BRIGHTEST, 0.1, 0.1, 0.0, 0.0, 0.7),
             "ski": (_ALBEDO * jumper.skis / BRIGHTEST, 0.07, 0.1, 0.0, 0.04, 0.4),
             "print": (0.6 * _ALBEDO * jumper.skis / BRIGHTEST, 0.2, 0.05, 0.0, 0.04, 0.4),
         }

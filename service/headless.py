@@ -39,12 +39,12 @@ from rig.transport.recorder_commands import RecorderOptions, StartRecording
 from rig.transport.recorder_reports import RecordingFinished
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
+from service.processes.rig_session import StartHill
 from service.recordings.in_progress import Outcome
 from service.recordings.storage import check_room_for
 from service.status.event_hub import EventHub
 from service.supervision.commands import at_once
 from service.supervision.picture import WarmUp
-from service.supervision.rig_session import StartHill
 from service.supervision.supervisor import Supervisor
 from triggering.sources.choice import trigger_source
 

@@ -37,6 +37,7 @@ from rig.transport.recorder_reports import (
 )
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RigProcesses
+from service.processes.rig_session import RigSession
 from service.recordings.in_progress import Outcome, RecordingInProgress
 from service.recordings.interruption import (
     DEATHS_MAX,
@@ -54,7 +55,6 @@ from service.status.statements import (
     recording_forgotten,
     recording_resumed,
 )
-from service.supervision.rig_session import RigSession
 from service.supervision.state_machine import StateMachine
 from service.supervision.tap_guard import CONFIRM_S, check_seen, check_stop
 
@@ -101,6 +101,10 @@ class RecordingControl:
     def use(self, rig: RigSettings, rig_toml: str) -> None:
         """Take other settings and attach another text of the rig file to the logs from now on."""
         self._rig, self._rig_toml = rig, rig_toml
+
+    def begin_armed(self) -> None:
+        """Note that the rig is armed from now on: memory begins to hold the past."""
+        self.armed_at = self.emptied_at = time.monotonic()
 
     def calibrate(self, calibration: Calibration | None) -> None:
         """Write another calibration into the logs from now on."""

@@ -15,9 +15,9 @@ from rig.settings.model import RigSettings
 from rig.settings.region import named
 from rig.transport.recorder_commands import Calibration
 from service.processes.rig_processes import RigProcesses
+from service.processes.rig_session import RigSession
 from service.status.forbidden import FORBIDDEN
 from service.supervision.recording_control import RecordingControl
-from service.supervision.rig_session import RigSession
 from service.supervision.state_machine import StateMachine
 
 #: Longest wait for complete triplets with another region, if they came before: a busy computer may be slow to begin.

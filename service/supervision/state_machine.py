@@ -1,4 +1,4 @@
-"""Holds the state of the service, and enforces which state may follow which.
+"""The state of the service: which may follow which, and which steps lead from a situation to the wanted one.
 
 ```
             arm                cameras answered            start
@@ -12,7 +12,8 @@
 From arming a recording goes on at once whose recorder died. From armed the rig is armed anew if its pulses get another
 rate.
 
-Only the supervisor's thread moves the machine; any thread reads its phase.
+Only the supervisor's thread moves the machine; any thread reads its phase. The decisions are pure functions
+(`next_steps`, `state_by_cameras`); the supervisor carries them out.
 """
 
 import threading
@@ -20,6 +21,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
@@ -99,3 +101,79 @@ class StateMachine:
                 raise ValueError(f"{to} cannot follow {before}")
             self._phase = Phase.now(to, self._phase.number + 1)
         self._on_move(before, to)
+
+
+class Processes(Enum):
+    """Which processes of the rig run."""
+
+    NONE = "none"
+    ALL = "all"
+    NO_RECORDER = "all but the recorder, which died"
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What decides the next steps.
+
+    Attributes:
+        state: the present state.
+        wanted: whether the rig is to be armed.
+        recording: whether a recording is in progress, or its log is being opened.
+        processes: which processes run.
+        busy: whether processes are being started or stopped.
+        empty: whether nothing is left to stop.
+        may_try: whether it is time to start processes, after a fault.
+    """
+
+    state: State
+    wanted: bool
+    recording: bool
+    processes: Processes
+    busy: bool
+    empty: bool
+    may_try: bool
+
+
+class Step(Enum):
+    """One step of the supervisor."""
+
+    BEGIN_DISARMING = "begin disarming"
+    REST = "rest"
+    STOP_ALL = "stop all processes"
+    BEGIN_ARMING = "begin arming"
+    START_ALL = "start all processes"
+    START_RECORDER = "start another recorder"
+
+
+def next_steps(now: Situation) -> tuple[Step, ...]:
+    """The steps from a situation towards the wanted one; none: there is nothing to do, or something must end first."""
+    if not now.wanted:
+        if now.state is State.IDLE or now.recording:
+            return ()
+        begin = () if now.state is State.DISARMING else (Step.BEGIN_DISARMING,)
+        if now.empty:
+            return (*begin, Step.REST)
+        return begin if now.busy else (*begin, Step.STOP_ALL)
+    if now.busy or not now.may_try or now.processes is Processes.ALL:
+        return ()
+    start = Step.START_ALL if now.processes is Processes.NONE else Step.START_RECORDER
+    return (Step.BEGIN_ARMING, start)
+
+
+def state_by_cameras(state: State, *, settled: bool, able: bool, any_present: bool) -> State:
+    """The state that follows from the cameras, while the rig is to be armed and nothing is recorded.
+
+    Args:
+        state: the present state.
+        settled: whether arming is done: all cameras have answered, or had time enough.
+        able: whether enough cameras are there.
+        any_present: whether at least one is.
+    """
+    match state:
+        case State.ARMING if settled:
+            return State.ARMED if able else State.FAULT
+        case State.ARMED if not able and not any_present:
+            return State.FAULT
+        case State.FAULT if able:
+            return State.ARMED
+    return state

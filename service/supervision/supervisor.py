@@ -26,6 +26,7 @@ from rig.transport.recorder_reports import CameraLimits, RecorderFailed, Recorde
 from service.alarms.unrecorded import Unrecorded
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RECORDER
+from service.processes.rig_session import RigSession, StartHill
 from service.recordings import live_results
 from service.recordings.calibration import read_calibration
 from service.recordings.storage import room_for
@@ -37,9 +38,8 @@ from service.supervision.commands import Commands
 from service.supervision.fault import Fault
 from service.supervision.picture import Facts, WarmUp, picture
 from service.supervision.recording_control import RecordingControl
-from service.supervision.rig_session import RigSession, StartHill
 from service.supervision.settings_control import RigInUse, SettingsControl
-from service.supervision.state_machine import StateMachine
+from service.supervision.state_machine import Processes, Situation, StateMachine, Step, next_steps, state_by_cameras
 from service.supervision.train_control import TrainControl
 from service.supervision.watching import STUCK_S, RecorderWatch, Settling, why_not_armed
 
@@ -276,24 +276,40 @@ class Supervisor:
             self._session.collect()
         except SvevError as error:
             self._rig_failed(error)
-        state = self._machine.state
-        if not self._wanted and state is not State.IDLE and self.recordings.current is None:
-            if state is not State.DISARMING:
+        for step in next_steps(self._situation()):
+            self._take(step)
+
+    def _situation(self) -> Situation:
+        session, processes = self._session, Processes.NONE
+        if session.processes is not None:
+            processes = Processes.NO_RECORDER if session.processes.recorder_died else Processes.ALL
+        return Situation(
+            self._machine.state,
+            wanted=self._wanted,
+            recording=self.recordings.current is not None,
+            processes=processes,
+            busy=session.busy,
+            empty=session.empty,
+            may_try=self._fault.may_try and self.recordings.may_restart,
+        )
+
+    def _take(self, step: Step) -> None:
+        match step:
+            case Step.BEGIN_DISARMING:
                 self._fault.clear()
                 self._machine.move(State.DISARMING)
-            if self._session.empty:
+            case Step.REST:
                 self._machine.move(State.IDLE)
-            elif not self._session.busy:
+            case Step.STOP_ALL:
                 self._session.begin_take_down(keep_hill=False)
-        elif self._wanted and not self._session.busy and self._fault.may_try and self.recordings.may_restart:
-            processes = self._session.processes
-            if processes is None or processes.recorder_died:
+            case Step.BEGIN_ARMING:
                 self._begin_arming()
-                if processes is None:
-                    self._session.begin_set_up()
-                else:
-                    processes.restart_recorder()
-                    self.recordings.go_on()
+            case Step.START_ALL:
+                self._session.begin_set_up()
+            case Step.START_RECORDER:
+                if self._session.processes is not None:
+                    self._session.processes.restart_recorder()
+                self.recordings.go_on()
 
     def _begin_arming(self) -> None:
         if self._machine.state is not State.ARMING:
@@ -355,15 +371,18 @@ class Supervisor:
             return
         fault = self._why_not()
         settled = self.settings.lacks_cameras(processes) or self._settling.settled(processes)
-        match state:
-            case State.ARMING if settled and self.settings.stands(processes, fault):
-                self.recordings.armed_at = self.recordings.emptied_at = time.monotonic()
-                self._machine.move(State.ARMED) if fault is None else self._refuse(fault)
-            case State.ARMED if fault is not None and not any(camera.present for camera in processes.cameras):
-                self._refuse(fault)
-            case State.FAULT if fault is None:
-                self._fault.clear()
-                self._machine.move(State.ARMED)
+        present = any(camera.present for camera in processes.cameras)
+        to = state_by_cameras(state, settled=settled, able=fault is None, any_present=present)
+        if to is state or (state is State.ARMING and not self.settings.stands(processes, fault)):
+            return
+        if state is State.ARMING:
+            self.recordings.begin_armed()
+        if fault is not None:
+            self._refuse(fault)
+            return
+        if state is State.FAULT:
+            self._fault.clear()
+        self._machine.move(State.ARMED)
 
     def _why_not(self) -> Statement | None:
         """Why the rig cannot be armed, in words; None: it can."""

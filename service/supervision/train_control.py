@@ -7,9 +7,9 @@ from rig.api.status import State
 from rig.errors import StateForbidsError
 from rig.events import TRIGGER, Event, Level
 from rig.phrase import phrase
+from service.processes.rig_session import RigSession
 from service.status.forbidden import FORBIDDEN
 from service.supervision.recording_control import RecordingControl
-from service.supervision.rig_session import RigSession
 from service.supervision.state_machine import StateMachine
 
 

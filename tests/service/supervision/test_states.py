@@ -113,8 +113,8 @@ STORIES: dict[str, tuple[tuple[Act, State], ...]] = {
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr("service.supervision.rig_session.RigProcesses", ProcessesInMemory)
-    monkeypatch.setattr("service.supervision.rig_session.prepare_programs", lambda _: None)
+    monkeypatch.setattr("service.processes.rig_session.RigProcesses", ProcessesInMemory)
+    monkeypatch.setattr("service.processes.rig_session.prepare_programs", lambda _: None)
     made = Bench(tmp_path)
     yield made
     made.supervisor._session.close()

@@ -151,7 +151,7 @@ class PulseCheck:
         if not is_json(message.data or b""):
             self._report(f"health record {message.sequence}: cannot be read")
         elif (health := health_of(message)) is not None:
-            self.recount.told(health, message.log_time)
+            self.recount.reported(health, message.log_time)
 
     def _jumper(self, message: Message) -> None:
         try:

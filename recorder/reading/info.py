@@ -26,7 +26,8 @@ from rig.topics import (
 )
 from rig.transport import wire
 from triggering.ledger.account import Ledger, runs_from_text
-from triggering.ledger.source_recount import SourceAccount, SourceRecount
+from triggering.ledger.recounted import SourceAccount
+from triggering.ledger.source_recount import SourceRecount
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +206,7 @@ def _tell(source: SourceRecount, tag: TripletTag | None, message: Message) -> No
     if tag is not None:
         source.add(tag)
     elif message.topic == HEALTH.name and (health := health_of(message)) is not None:
-        source.told(health, message.log_time)
+        source.reported(health, message.log_time)
 
 
 def known_lost(reader: LogReader) -> tuple[tuple[int, int], ...]:

@@ -1,12 +1,12 @@
-"""Recomputes what became of every pulse in every camera from what a log holds of its frames, and compares the tags.
+"""Recomputes the fate of every pulse in every camera from the frames of a log, and compares it with the tags.
 
-The pairing decided while frames were still coming. Afterwards everything is there, and for two whole frames of a camera
-that follow each other, the log says by itself what must have become of the pulses between them: the frame numbers say
-how many frames the camera took, its trigger count how many pulses it saw, its clock whether the second frame belongs to
-the pulse that it is filed under. Of all that the pairing found out, only the tags are used, to be compared.
+The pairing decided while frames were still coming. Afterwards all frames are there, and two consecutive whole frames of
+a camera determine the fate of the pulses between them: the frame numbers say how many frames the camera took, its
+trigger count how many pulses it saw, its clock whether the second frame belongs to the pulse under which it is filed.
+No other result of the pairing is used than the tags, which are compared.
 
-What cannot be proved is left to the tags and counted: pulses before the first and after the last frame of a camera, and
-those at which it was gone or silent (the log's events tell) or its clock was set.
+Where there is no proof, the tags are counted as they are: pulses before the first and after the last frame of a camera,
+and pulses at which the camera was gone or silent (by the log's events) or its clock was set.
 """
 
 from bisect import bisect_left
@@ -33,7 +33,7 @@ _BREAKS: Final = frozenset(
 )
 #: The rate of a camera's clock is known from frames that are at least so far apart.
 _BASE_NS: Final = NS_PER_S
-#: No clock is wrong by more than this share; what looks like it is no clock.
+#: No clock is wrong by more than this share; a larger deviation is an error.
 _GAIN_MAX: Final = 0.01
 #: Disagreements that are kept one by one; the counts go on.
 _KEPT: Final = 10_000
@@ -41,7 +41,7 @@ _KEPT: Final = 10_000
 
 @dataclass(frozen=True, slots=True)
 class _Gap:
-    """What lies between two whole frames of a camera; one of them is missing at the ends of the log.
+    """The pulses between two whole frames of a camera; one of the frames is missing at the ends of the log.
 
     Attributes:
         before, after: the frames.
@@ -59,7 +59,7 @@ class _Gap:
 
 @dataclass(slots=True)
 class _Camera:
-    """What is known of a camera so far."""
+    """State of one camera."""
 
     name: str
     states: Counter[FrameStatus] = field(default_factory=Counter)
@@ -118,9 +118,9 @@ class Recount:
         if event.message.partition(":")[0] in _BREAKS:
             self._camera(event.name).breaks.append(event.time)
 
-    def told(self, health: Health, written: UtcNs) -> None:
-        """Take a health record, written at a time: it says what the source of the pulses told."""
-        self._source.told(health, written)
+    def reported(self, health: Health, written: UtcNs) -> None:
+        """Take a health record, written at a time: it holds reports of the source of the pulses."""
+        self._source.reported(health, written)
 
     def finish(self, *, merged: bool = False) -> Recounted:
         """Judge everything; for use once, at the end of the log.
@@ -137,7 +137,7 @@ class Recount:
                 camera.gaps.append(_Gap(camera.last, None, tuple(camera.between), cut=True))
             for gap, moved in _with_moves(camera):
                 if moved:
-                    self._believe(camera, gap)
+                    self._count_as_tagged(camera, gap)
                 else:
                     self._judge(camera, gap)
             for stretch in stretches(camera.runs, shifts(camera.runs)):
@@ -205,14 +205,14 @@ class Recount:
     def _judge(self, camera: _Camera, gap: _Gap) -> None:
         before, after = gap.before, gap.after
         if gap.cut or before is None or after is None or _broken(camera, before, after):
-            self._believe(camera, gap)
+            self._count_as_tagged(camera, gap)
             return
         step = id_step(before.frame_id, after.frame_id)
         if step <= 0:
             why = f"its frame number is {after.frame_id}, that of pulse {before.pulse} is {before.frame_id}, and its "
             why += "clock goes on"
             self._differs(Difference(after.pulse, camera.name, FrameStatus.OK, None, why))
-            self._believe(camera, gap)
+            self._count_as_tagged(camera, gap)
             return
         pulses = after.pulse - before.pulse - 1
         taken, untagged = step - 1, pulses - len(gap.tagged)
@@ -233,13 +233,13 @@ class Recount:
                 why += f"{before.pulse} and {after.pulse}"
                 self._differs(Difference(pulse, camera.name, tagged, found, why))
 
-    def _believe(self, camera: _Camera, gap: _Gap) -> None:
-        """Count the pulses of a gap as they are tagged, for want of evidence."""
+    def _count_as_tagged(self, camera: _Camera, gap: _Gap) -> None:
+        """Count the pulses of a gap as they are tagged: there is no evidence."""
         self._unproven += len(gap.tagged)
         camera.states.update(status for _, status in gap.tagged)
 
     def _is_elsewhere(self, camera: _Camera, pulse: PulseNumber, why: str, by: int) -> None:
-        """Note a frame that its clock files under another pulse; those that follow each other are one stretch."""
+        """Note a frame that belongs to another pulse by its clock; consecutive ones are one stretch."""
         earlier = camera.elsewhere
         if earlier is not None and earlier.by == by:
             camera.elsewhere = replace(earlier, last=pulse)

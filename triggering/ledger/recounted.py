@@ -1,4 +1,4 @@
-"""The recomputed ledger of a log: what became of each pulse by the evidence, beside what its tags say."""
+"""The recomputed ledger of a log, compared with its tags."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -7,7 +7,6 @@ from typing import Any
 
 from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
-from triggering.ledger.source_recount import SourceAccount
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +51,45 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True)
+class SourceAccount:
+    """The reports of the source for the time in which the log has tags, compared with the tags.
+
+    Attributes:
+        fired: pulses that the source reports.
+        unseen: how many of them no camera has a frame of, while a tag says that one missed it.
+        untagged: how many of them have no tag.
+        unfired: how many tags are of pulses that the source did not fire.
+        findings: the untagged and unfired pulses in words, and counts of the pairing that contradict these.
+    """
+
+    fired: int
+    unseen: int
+    untagged: int
+    unfired: int
+    findings: tuple[str, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether source, tags and pairing agree."""
+        return not self.findings
+
+    def to_json(self) -> dict[str, Any]:
+        """The account as JSON."""
+        return {
+            "fired": self.fired, "unseen": self.unseen, "untagged": self.untagged, "unfired": self.unfired,
+            "findings": list(self.findings),
+        }  # fmt: skip
+
+    def summary_line(self) -> str:
+        """The account in one line."""
+        verdict = "agrees" if self.agrees else "does not agree"
+        return (
+            f"the source's own count {verdict}: {self.fired} pulses fired, {self.unseen} of them seen by no camera, "
+            f"{self.untagged} without a tag; {self.unfired} tagged that it did not fire"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Recounted:
     """The recomputed ledger, beside the tags.
 
@@ -61,7 +99,7 @@ class Recounted:
         unproven: missing frames whose state rests on the tag alone.
         differences: where tag and evidence differ, the first ten thousand.
         disagreements: how many there are.
-        source: what the source of the pulses says of them; None: it tells nothing, or the log does not hold it.
+        source: comparison with the reports of the source; None: the log holds none.
     """
 
     pulses: int
@@ -73,7 +111,7 @@ class Recounted:
 
     @property
     def agrees(self) -> bool:
-        """Whether no tag is contradicted, and the source's own count bears them out."""
+        """Whether nothing contradicts the tags: neither the frames nor the reports of the source."""
         return self.disagreements == 0 and (self.source is None or self.source.agrees)
 
     @property

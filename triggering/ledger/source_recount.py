@@ -1,10 +1,10 @@
-"""Recomputes from a log what the source of the pulses fired and what became of it, and compares the live account.
+"""Compares the tags of a log with the reports of the source of the pulses, and with the counts of the pairing.
 
-The log's health records hold, in words of some pulses each, what the source told (`rig.health.ToldPulses`), and the
-counts that the pairing had at that moment (`SourcePairing`). Here all words are there at once. A pulse of the source
-and a tag are the same if neither has a nearer one within half of the source's interval, after the median delay of
-exposures behind edges is taken off. As in the pairing, times whose error could swap pulses prove nothing, and nothing
-is said of times of which the source has not told.
+The log's health records hold the reports of the source, some pulses each (`rig.health.ToldPulses`), and the counts that
+the pairing had at that moment (`SourcePairing`). Here all reports are there at once. A pulse of the source and a tag
+are the same if neither has a nearer one within half of the source's interval, after the median delay of exposures
+behind edges is subtracted. As in the pairing, times whose error could swap pulses prove nothing, and times without a
+report are not judged.
 """
 
 from array import array
@@ -13,20 +13,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from statistics import median
-from typing import Any, Final
+from typing import Final
 
 from rig.clocks import NS_PER_S, NS_PER_US, UtcNs
 from rig.frame import FrameStatus
 from rig.health import Health, SourcePairing, ToldPulses
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
+from triggering.ledger.recounted import SourceAccount
 
-#: Half of the distance at which two pulses are the same is left to the source's clock, the rest to the cameras'.
+#: Share of the distance at which two pulses are the same that the error of the source's clock may take.
 _SHARE: Final = 0.5
-#: The pairing has decided a pulse and heard of it after so long, or so many periods.
+#: The pairing has decided a pulse and received the report of it after so long, or so many periods.
 _SETTLED_NS: Final = NS_PER_S
 _SETTLED_PERIODS: Final = 12
-#: Pulses that are named one by one.
+#: Pulses that are listed one by one.
 _KEPT: Final = 1000
 #: Times and pulse numbers of a recorder have 63 bits; others stand in damaged logs only, and prove nothing.
 _LARGEST: Final = (1 << 63) - 1
@@ -34,48 +35,9 @@ _LARGEST: Final = (1 << 63) - 1
 _TIMED: Final = 3
 
 
-@dataclass(frozen=True, slots=True)
-class SourceAccount:
-    """What the source told of the time in which the log has tags, beside the tags.
-
-    Attributes:
-        fired: pulses that the source says it has fired.
-        unseen: of them, no camera has a frame, but there is a tag, which says that one missed it.
-        untagged: of them, how many have no tag.
-        unfired: how many tags are of pulses that the source did not fire.
-        findings: the untagged and unfired ones in words, and counts of the live account that differ from these.
-    """
-
-    fired: int
-    unseen: int
-    untagged: int
-    unfired: int
-    findings: tuple[str, ...]
-
-    @property
-    def agrees(self) -> bool:
-        """Whether source, tags and live account say the same."""
-        return not self.findings
-
-    def to_json(self) -> dict[str, Any]:
-        """The account as JSON."""
-        return {
-            "fired": self.fired, "unseen": self.unseen, "untagged": self.untagged, "unfired": self.unfired,
-            "findings": list(self.findings),
-        }  # fmt: skip
-
-    def summary_line(self) -> str:
-        """The account in one line."""
-        verdict = "agrees" if self.agrees else "does not agree"
-        return (
-            f"the source's own count {verdict}: {self.fired} pulses fired, {self.unseen} of them seen by no camera, "
-            f"{self.untagged} without a tag; {self.unfired} tagged that it did not fire"
-        )
-
-
 @dataclass(slots=True)
 class _Stretch:
-    """Pulses that follow each other by the source's count; it has told of all between its first one and `until`."""
+    """Consecutive pulses by the source's count; all from the first one to `until` have been reported."""
 
     times: "array[int]"
     until: int
@@ -83,7 +45,7 @@ class _Stretch:
 
 @dataclass(slots=True)
 class _Found:
-    """What comparison finds: times of pulses, UTC."""
+    """Result of the comparison: times of pulses, UTC."""
 
     fired: int = 0
     unseen: list[int] = field(default_factory=list)
@@ -96,7 +58,7 @@ class SourceRecount:
 
     def __init__(self) -> None:
         self._pulses, self._times, self._unseen = array("q"), array("q"), bytearray()
-        self._words: list[ToldPulses] = []
+        self._reports: list[ToldPulses] = []
         self._to_utc: int | None = None
         self._live: list[tuple[int, SourcePairing]] = []
 
@@ -109,7 +71,7 @@ class SourceRecount:
         self._times.append(tag.time)
         self._unseen.append(FrameStatus.OK not in statuses and FrameStatus.MISSED in statuses)
 
-    def told(self, health: Health, written: UtcNs) -> None:
+    def reported(self, health: Health, written: UtcNs) -> None:
         """Take a health record.
 
         Args:
@@ -123,15 +85,15 @@ class SourceRecount:
             return
         behind = written - health.host_time_ns  # a record is written at once, or a little later
         self._to_utc = behind if self._to_utc is None else min(self._to_utc, behind)
-        self._words += [word for word in health.fired or () if _credible(*word.times_ns, word.until_ns)]
+        self._reports += [report for report in health.fired or () if _credible(*report.times_ns, report.until_ns)]
 
     def finish(self) -> SourceAccount | None:
-        """Compare everything; None: the log does not hold what the source told, or too inexactly."""
-        times = [time for word in self._words for time in word.times_ns]
+        """Compare everything; None: the log holds no reports of the source, or too inexact ones."""
+        times = [time for report in self._reports for time in report.times_ns]
         if self._to_utc is None or len(times) < _TIMED or not self._times:
             return None
         period = median(after - before for before, after in pairwise(times))
-        stretches = list(_stretches(self._words, _SHARE * period / 2))
+        stretches = list(_stretches(self._reports, _SHARE * period / 2))
         found, shift = _Found(), self._to_utc + self._delay(stretches, period / 2)
         for stretch in stretches:
             self._compare(stretch, shift, period, found)
@@ -185,36 +147,37 @@ class SourceRecount:
         return time - self._times[max(0, bisect_right(self._times, time) - 1)]
 
     def _contradictions(self, found: _Found, settled: int) -> Iterator[str]:
-        """Counts of the live account that cannot come from what is found; decisions come up to `settled` ns late."""
+        """Counts of the pairing that contradict the result; its decisions come up to `settled` ns late."""
         live = [each for each in self._live if each[0] >= self._times[0] + settled]
         if not live:
             return
         (begin, before), (end, after) = live[0], live[-1]
         for name, times in (("unseen", found.unseen), ("untagged", found.untagged), ("unfired", found.unfired)):
-            told = getattr(after, name) - getattr(before, name)
+            counted = getattr(after, name) - getattr(before, name)
             least = sum(begin <= time < end - settled for time in times)
             most = sum(begin - settled <= time < end for time in times)
-            if told < 0:  # the recorder began anew
+            if counted < 0:  # the recorder began anew
                 return
-            if told > most or (told < least and name != "unseen"):  # frame numbers may have proven an unseen one first
-                yield f"live, {told} pulses were counted as {name}, and by the log it is {least} to {most}"
+            too_few = counted < least and name != "unseen"  # frame numbers may have proven an unseen one first
+            if counted > most or too_few:
+                yield f"live, {counted} pulses were counted as {name}, and by the log it is {least} to {most}"
 
 
-def _stretches(words: Sequence[ToldPulses], error_ns: float) -> Iterator[_Stretch]:
-    """The stretches of words whose times are no more uncertain than `error_ns`."""
+def _stretches(reports: Sequence[ToldPulses], error_ns: float) -> Iterator[_Stretch]:
+    """The stretches of reports whose times are no more uncertain than `error_ns`."""
     stretch, follows = None, None
-    for word in words:
-        if word.times_ns and (word.first != follows or word.uncertainty_us * NS_PER_US > error_ns):
+    for report in reports:
+        if report.times_ns and (report.first != follows or report.uncertainty_us * NS_PER_US > error_ns):
             if stretch is not None:
                 yield stretch
             stretch = None
-        if word.times_ns:
-            follows = word.first + len(word.times_ns)
-            if word.uncertainty_us * NS_PER_US <= error_ns:
-                stretch = stretch or _Stretch(array("q"), word.times_ns[0])
-                stretch.times.extend(word.times_ns)
+        if report.times_ns:
+            follows = report.first + len(report.times_ns)
+            if report.uncertainty_us * NS_PER_US <= error_ns:
+                stretch = stretch or _Stretch(array("q"), report.times_ns[0])
+                stretch.times.extend(report.times_ns)
         if stretch is not None:
-            stretch.until = word.until_ns
+            stretch.until = report.until_ns
     if stretch is not None:
         yield stretch
 

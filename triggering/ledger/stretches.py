@@ -1,9 +1,9 @@
 """Finds stretches of pulses that hold the frames of other pulses, from frame numbers and arrivals.
 
-Where the times of a camera's frames slip by whole periods, tags and times agree, and only two witnesses are left: the
+Where the times of a camera's frames slip by whole periods, tags and times agree, and two kinds of evidence remain: the
 frame numbers jump against the pulses where the slip begins or ends, and in between each frame comes by so many periods
-later, or sooner, after its pulse than those before. Frame numbers alone do not tell how long it lasts: where they fall
-short, the times may have come back, or the camera missed a pulse.
+later, or sooner, after its pulse than the frames before. Frame numbers alone do not tell how long the slip lasts: where
+they fall short, the times may have come back, or the camera missed a pulse.
 """
 
 from collections.abc import Sequence
@@ -90,14 +90,14 @@ def shifts(runs: Sequence[Run]) -> list[int]:
         low, high = low + min(0, run.excess), high + max(0, run.excess)
         # A camera may miss pulses where its times come back: the numbers only bound what arrivals tell.
         if (low == high and not shift) or usual.frames < _FRAMES:
-            told: int | None = 0
+            own: int | None = 0
         else:
-            told = _told(usual, run)
-        found.append(told)
-        if told is None:
+            own = _shift(usual, run)
+        found.append(own)
+        if own is None:
             continue
-        if low <= told - shift <= high or not told:
-            shift = told
+        if low <= own - shift <= high or not own:
+            shift = own
         found[-1], low, high = shift, 0, 0
         if not shift:
             usual.add(run)
@@ -119,7 +119,7 @@ def stretches(runs: Sequence[Run], shifted: Sequence[int]) -> list[Stretch]:
     return found
 
 
-def _told(usual: Run, run: Run) -> int | None:
+def _shift(usual: Run, run: Run) -> int | None:
     """By how many periods later than usual the frames of a run came; None: too few to tell, or no rhythm."""
     if run.farther >= _RHYTHM * run.nearest:
         return None
@@ -130,7 +130,7 @@ def _told(usual: Run, run: Run) -> int | None:
 
 
 def _between(found: Sequence[int | None], place: int) -> int:
-    """The shift of a run; where it is not known, that of its neighbours if they have one."""
+    """The shift of a run; where it is not known, the shift of its neighbours if they agree."""
     shift = found[place]
     if shift is not None:
         return shift

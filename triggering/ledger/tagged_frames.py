@@ -1,4 +1,4 @@
-"""What two whole frames of a camera, as their tags describe them, say of the pulses between them."""
+"""Evidence from two whole frames of a camera, as their tags describe them, about the pulses between them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class TaggedFrame:
 
 
 def frame_of(tag: TripletTag, part: CameraTag) -> TaggedFrame | None:
-    """The frame of a camera's part of a tag; None if that says too little of it."""
+    """The frame of a camera's part of a tag; None if a field is missing or impossible."""
     if part.frame_id is None or part.device_time is None or part.host_time is None:
         return None
     if max(abs(part.frame_id), abs(part.trigger_count or 0)) > _COUNT_MAX:
@@ -44,10 +44,10 @@ def goes_on(last: TaggedFrame | None, frame: TaggedFrame, steps: int) -> bool:
 
 
 def is_of_another_pulse(last: TaggedFrame, frame: TaggedFrame, by_clock: float, nearest: int, *, certain: bool) -> bool:
-    """Whether a frame is filed under a wrong pulse, where its clock says so and its number bears the clock out.
+    """Whether a frame is filed under a wrong pulse: clock and frame number agree on another one.
 
-    Otherwise the clock was set: then it stands alone. A camera that missed a pulse while its clock was set back by just
-    one period looks alike; there, the arrival decides. `certain`: no pulse between the two is said to be missing.
+    If the number contradicts the clock, the clock was set. A camera that missed a pulse while its clock was set back by
+    just one period looks alike; there, the arrival decides. `certain`: no pulse between the two is tagged as missing.
     """
     step = id_step(last.frame_id, frame.frame_id)
     if abs(by_clock - step * nearest) >= nearest / 2:

@@ -42,7 +42,7 @@ class Log:
             account.add(tag)
         for health in self.healths:
             assert health.host_time_ns is not None
-            account.told(health, UtcNs(health.host_time_ns + 300 * US))
+            account.reported(health, UtcNs(health.host_time_ns + 300 * US))
         return account.finish()
 
 
@@ -148,7 +148,7 @@ def test_times_that_are_too_uncertain_and_logs_without_them_prove_nothing() -> N
     for tag in log.tags:
         old.add(tag)
     for health in log.healths:
-        old.told(health, UtcNs(1))
+        old.reported(health, UtcNs(1))
     assert old.finish().source is None
 
 

@@ -118,7 +118,7 @@ class Marks:
             if self._motion is not None and self._motion.on:
                 self.mark(_mark("motion", time))
                 return
-            self._supervisor.commands.ask(at_once(self._supervisor.moved), _NOTED_S)
+            self._supervisor.commands.ask(at_once(self._supervisor.board.moved), _NOTED_S)
         except SvevError as error:
             self._not_begun("motion", error.said)
 
@@ -132,7 +132,7 @@ class Marks:
     def _not_begun(self, name: str, why: Phrase) -> None:
         """Say that a jump came and no recording could begin: an alarm, until the next one begins."""
         try:
-            self._supervisor.commands.ask(at_once(partial(self._supervisor.not_begun, why)), _NOTED_S)
+            self._supervisor.commands.ask(at_once(partial(self._supervisor.board.not_begun, why)), _NOTED_S)
         except SvevError:  # the service ends, or does not answer: then the log alone can say it
             self._tell(Level.WARNING, name, phrase("event_unrecorded", "no recording could begin: {why}", why=why))
 

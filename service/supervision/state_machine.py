@@ -103,6 +103,19 @@ class StateMachine:
         self._on_move(before, to)
 
 
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What people want of the rig.
+
+    Attributes:
+        armed: it is to be armed.
+        least_cameras: so many cameras are enough.
+    """
+
+    armed: bool
+    least_cameras: int
+
+
 class Processes(Enum):
     """Which processes of the rig run."""
 

@@ -7,44 +7,48 @@ never waits for anything but the next report or command.
 import select
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
-from rig.api.jump import LastJump
 from rig.api.statement import Statement
 from rig.api.status import State, Status
 from rig.errors import ProcessDiedError, StateForbidsError, SvevError
 from rig.events import Event, Level
 from rig.health import Health
-from rig.host.disk import free_bytes
-from rig.phrase import Phrase, phrase
+from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.settings.region import RegionLimits
 from rig.transport.analysis_messages import JumpMeasured, Measuring
 from rig.transport.recorder_commands import RecorderOptions
 from rig.transport.recorder_reports import CameraLimits, RecorderFailed, RecorderHealth, RecorderReport
-from service.alarms.unrecorded import Unrecorded
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import RECORDER
 from service.processes.rig_session import RigSession, StartHill
-from service.recordings import live_results
 from service.recordings.calibration import read_calibration
-from service.recordings.storage import room_for
 from service.recordings.truth import TruthWriter
 from service.status.event_hub import EventHub
 from service.status.forbidden import FORBIDDEN
-from service.status.statements import measured, moved
+from service.status.statements import moved
 from service.supervision.commands import Commands
 from service.supervision.fault import Fault
-from service.supervision.picture import Facts, WarmUp, picture
+from service.supervision.picture import WarmUp
 from service.supervision.recording_control import RecordingControl
 from service.supervision.settings_control import RigInUse, SettingsControl
-from service.supervision.state_machine import Processes, Situation, StateMachine, Step, next_steps, state_by_cameras
+from service.supervision.state_machine import (
+    Goal,
+    Processes,
+    Situation,
+    StateMachine,
+    Step,
+    next_steps,
+    state_by_cameras,
+)
+from service.supervision.status_board import StatusBoard
 from service.supervision.train_control import TrainControl
 from service.supervision.watching import STUCK_S, RecorderWatch, Settling, why_not_armed
 
 _TURN_S: Final = 0.2
-_PICTURE_S: Final = 1.0
 _FINISH_S: Final = 4.0
 #: If a turn takes longer than this, the loop hangs.
 _TURNS_S: Final = 5.0
@@ -66,13 +70,13 @@ class Supervisor:
         BadInputError: the rig's calibration file is missing or wrong.
 
     Attributes:
-        rig, rig_toml, hub: as given.
+        hub: as given.
         on_turn: called at every turn, e.g. to feed a watchdog; set it before `start`.
         on_end: called when the thread ends, for whatever reason; set it before `start`.
-        health: the recorder's last health record, None if there is none.
         failure: the error that ended the thread, None if there was none.
         commands: through which other threads give commands.
         changing: held by the thread that changes settings of the rig in use.
+        board: the status, renewed at every turn; only for commands in the supervisor's thread.
         recordings: starts and ends recordings; only for commands in the supervisor's thread.
         train, settings: stops and starts the pulses; takes other settings. Likewise.
         limits: which regions cameras take, by name, as those that were connected have said.
@@ -91,8 +95,8 @@ class Supervisor:
         enduring: bool = True,
     ) -> None:
         calibration = read_calibration(rig)
-        self.rig, self.rig_toml, self.hub = rig, rig_toml, hub
-        self._recorder, self._enduring = recorder, enduring
+        self._in_use, self.hub = RigInUse(rig, rig_toml), hub
+        self._enduring = enduring
         self.on_turn: Callable[[], None] = lambda: None
         self.on_end: Callable[[], None] = lambda: None
         self.failure: Exception | None = None
@@ -100,29 +104,37 @@ class Supervisor:
         self._machine = StateMachine(self._moved)
         self._session = RigSession(rig, hub.tell, self.commands.ring, recorder=recorder, hill=hill)
         self.truths = TruthWriter(hub.tell)
-        self._jumpers = jumpers or JumperBook()
-        self.recordings = RecordingControl(
-            self._machine, self._session, self._jumpers, rig_toml, calibration, self.truths
-        )
-        self._fault, self._wanted = Fault(), False
-        self._least = rig.least_cameras
+        jumpers = jumpers or JumperBook()
+        self.recordings = RecordingControl(self._machine, self._session, jumpers, rig_toml, calibration, self.truths)
+        self._fault, self._goal = Fault(), Goal(armed=False, least_cameras=rig.least_cameras)
         self._settling, self._watch = Settling(rig), RecorderWatch(rig, self._session.tell)
-        self.train = TrainControl(self._machine, self._session, self.recordings, self._refresh)
+        self.board = StatusBoard(hub, jumpers, self._machine, self._session, self.recordings, self._fault, self._watch)
+        self.train = TrainControl(self._machine, self._session, self.recordings, self.board.renew)
         self.settings = SettingsControl(self._machine, self._session, self.recordings, self._use, self._begin_again)
         self.limits: dict[str, RegionLimits] = {}
-        self._unrecorded = Unrecorded()
         self._ending_by: float | None = None
-        self._dirty, self._pictured = True, 0.0
         self._turned = time.monotonic()
-        self.health: Health | None = None
-        self._last_jump = live_results.latest(recorder.directory) if rig.analysis else None
-        self._status = self._picture()
         self._thread = threading.Thread(target=self._run, name="supervisor")
+
+    @property
+    def rig(self) -> RigSettings:
+        """The rig in use."""
+        return self._in_use.rig
+
+    @property
+    def rig_toml(self) -> str:
+        """The text of its file."""
+        return self._in_use.toml
 
     @property
     def status(self) -> Status:
         """The latest status, at most a second old; any thread may ask."""
-        return self._status
+        return self.board.status
+
+    @property
+    def health(self) -> Health | None:
+        """The recorder's last health record, None if there is none; any thread may ask."""
+        return self.board.health
 
     def start(self) -> None:
         """Start the thread."""
@@ -163,20 +175,20 @@ class Supervisor:
         if state is State.DISARMING:
             raise StateForbidsError(FORBIDDEN["arm", state])
         if min_cameras is not None and state not in {State.ARMED, State.RECORDING}:
-            self._least = min(min_cameras, len(self.rig.cameras))
+            self._goal = replace(self._goal, least_cameras=min(min_cameras, len(self.rig.cameras)))
         if state is State.FAULT and self._why_not() is None:
             self._judge()
         elif state in {State.IDLE, State.FAULT}:
-            self._wanted = True
+            self._goal = replace(self._goal, armed=True)
             self._fault.hurry()
             self._machine.move(State.ARMING)
             if self._session.processes is not None and not self._session.processes.recorder_died:
                 self._session.begin_take_down(keep_hill=True)
             self._reconcile()
-        return self._refresh()
+        return self.board.renew()
 
     def _use(self, new: RigInUse) -> None:
-        self.rig, self.rig_toml = new.rig, new.toml
+        self._in_use = new
         self._session.rig, self._settling = new.rig, Settling(new.rig)
         self.recordings.use(new.rig, new.toml)
         self._watch.use(new.rig)
@@ -187,7 +199,7 @@ class Supervisor:
         if self._machine.state is not State.ARMING:
             self._machine.move(State.ARMING)
         self._session.begin_take_down(keep_hill=keep_hill)
-        self._refresh()
+        self.board.renew()
 
     def note(self, event: Event) -> None:
         """Command: tell an event, also to the log of a recording that runs or begins soon."""
@@ -200,16 +212,7 @@ class Supervisor:
             UnknownAlarmError: it is over.
         """
         self._watch.alarms.acknowledge(alarm)
-        return self._refresh()
-
-    def moved(self) -> None:
-        """Command: note that somebody has come into sight, and that no recording begins for it."""
-        self._unrecorded.moved(time.monotonic())
-
-    def not_begun(self, why: Phrase) -> None:
-        """Command: note that a jump came, and that no recording could begin for it, and why."""
-        self._unrecorded.refused(why)
-        self._refresh()
+        return self.board.renew()
 
     def look(self) -> WarmUp:
         """Command: say how far the rig has come since it was armed."""
@@ -223,9 +226,9 @@ class Supervisor:
         if self._machine.state is State.RECORDING or self.recordings.current is not None:
             raise StateForbidsError(FORBIDDEN["disarm", State.RECORDING])
         self.settings.drop(phrase("why_region_disarmed", "the rig was disarmed before it was tried"))
-        self._wanted, self._least = False, self.rig.least_cameras
+        self._goal = Goal(armed=False, least_cameras=self.rig.least_cameras)
         self._reconcile()
-        return self._refresh()
+        return self.board.renew()
 
     def _run(self) -> None:
         try:
@@ -242,7 +245,7 @@ class Supervisor:
             self._session.close()
             self.recordings.abandon()
             self.truths.end(_FINISH_S)
-            self._refresh()
+            self.board.renew()
             self.commands.end()
             self.on_end()
 
@@ -255,14 +258,13 @@ class Supervisor:
             self._rig_failed(error)
         self._judge()
         self._turned = time.monotonic()
-        if self._dirty or self._turned >= self._pictured + _PICTURE_S:
-            self._refresh()
+        self.board.renew_if_due()
         self.recordings.answer()
         self.on_turn()
 
     def _ended(self, finish_by: float) -> bool:
         """Whether the thread may end: stop a recording in progress first, and wait for its end until `finish_by`."""
-        self._wanted = False
+        self._goal = replace(self._goal, armed=False)
         current = self.recordings.current
         if current is None or time.monotonic() > finish_by:
             return True
@@ -285,7 +287,7 @@ class Supervisor:
             processes = Processes.NO_RECORDER if session.processes.recorder_died else Processes.ALL
         return Situation(
             self._machine.state,
-            wanted=self._wanted,
+            wanted=self._goal.armed,
             recording=self.recordings.current is not None,
             processes=processes,
             busy=session.busy,
@@ -329,10 +331,10 @@ class Supervisor:
         for report in processes.turn(_TURN_S, (self.commands.bell,)):
             match report:
                 case JumpMeasured():
-                    self._jump_measured(report.jump)
+                    self.board.jump_measured(report.jump)
                 case Measuring():
                     self._watch.alarms.measuring(report.refused)
-                    self._dirty = True
+                    self.board.change()
                 case _:
                     self._hear(report)
             if isinstance(report, RecorderHealth):
@@ -343,7 +345,7 @@ class Supervisor:
             processes.kill_recorder()
 
     def _hear(self, report: RecorderReport) -> None:
-        self._dirty = True
+        self.board.change()
         self._watch.hear(report)
         if isinstance(report, CameraLimits):
             self.limits[self.rig.cameras[report.camera].name] = report.limits
@@ -351,23 +353,10 @@ class Supervisor:
             self._fault.complain(report.error())
         self.recordings.hear(report)
 
-    def _jump_measured(self, jump: LastJump) -> None:
-        self._last_jump, self._dirty = jump, True
-        self._session.tell(Event.now(_level(jump), "analysis", measured(jump)))
-
-    def know_jumps(self, jumps: Sequence[LastJump]) -> None:
-        """Take what was measured in a whole log in place of what was measured live; only in the supervisor's thread."""
-        for jump in jumps:
-            self.hub.tell(Event.now(_level(jump), "analysis", measured(jump)))
-        known, last = self._last_jump, jumps[-1]
-        if known is None or known.recording == last.recording or known.time <= last.time:
-            self._last_jump = last
-            self._refresh()
-
     def _judge(self) -> None:
         """Move between arming, armed and fault, depending on which cameras are connected."""
         processes, state = self._session.processes, self._machine.state
-        if processes is None or not self._wanted or self.recordings.current is not None:
+        if processes is None or not self._goal.armed or self.recordings.current is not None:
             return
         fault = self._why_not()
         settled = self.settings.lacks_cameras(processes) or self._settling.settled(processes)
@@ -386,7 +375,7 @@ class Supervisor:
 
     def _why_not(self) -> Statement | None:
         """Why the rig cannot be armed, in words; None: it can."""
-        return why_not_armed(self.rig, self._session.processes, self._least)
+        return why_not_armed(self.rig, self._session.processes, self._goal.least_cameras)
 
     def _refuse(self, fault: Statement) -> None:
         self._fault.refuse(fault)
@@ -396,66 +385,21 @@ class Supervisor:
         """Handle that setting up failed or that the recorder died: try again later, or end if not `enduring`."""
         if self.settings.go_back(error.said):
             return
-        final = self.recordings.interrupt(error) if self._enduring and self._wanted else error
+        final = self.recordings.interrupt(error) if self._enduring and self._goal.armed else error
         said = self._fault.fail(error, time.monotonic() - self._settling.began, hurry=final is None)
         if final is not None:
             self.recordings.fail(final, State.FAULT)
         if not self._enduring:
             self.failure, self._ending_by = self._fault.cause or error, time.monotonic()
             return
-        if not self._wanted:
+        if not self._goal.armed:
             return
         if self._machine.state is not State.FAULT:
             self._machine.move(State.FAULT)
         self._session.tell(Event.now(Level.FATAL, RECORDER, said))
 
     def _moved(self, before: State, to: State) -> None:
-        self._dirty = True
+        self.board.change()
         level = Level.ERROR if to is State.FAULT else Level.INFO
         fault = self._fault.statement if to is State.FAULT else None
         self._session.tell(Event.now(level, "service", moved(before, to, fault)))
-
-    def _refresh(self) -> Status:
-        self._dirty, self._pictured = False, time.monotonic()
-        waits = self._machine.state is State.ARMED and self.recordings.current is None
-        recording = self.recordings.current is not None
-        said = self._unrecorded.look(self._jumpers.view(), waits=waits, recording=recording, now=self._pictured)
-        self._watch.alarms.unrecorded(said)
-        self._status = self._picture()
-        if not self.recordings.opening:
-            self._jumpers.announce()
-        self.hub.wake()
-        return self._status
-
-    def _picture(self) -> Status:
-        processes, phase, current = self._session.processes, self._machine.phase, self.recordings.current
-        fault = self._fault.statement if phase.state is State.FAULT else None
-        self.health = None if processes is None else processes.health
-        # The recorder asks the disk in its own time; asking here as well might wait for a disk that hangs.
-        free = self.health.disk.free_bytes if self.health else free_bytes(self._recorder.directory)
-        facts = Facts(
-            phase=phase,
-            fault=fault,
-            notice=self.recordings.notice if phase.state in {State.ARMED, State.RECORDING} else None,
-            heard=None if processes is None else tuple(processes.cameras),
-            health=self.health,
-            warm=processes is not None and processes.warm,
-            pulses=self._watch.pulses,
-            still=self.train.still,
-            alarms=self._watch.alarms.present,
-            overloaded=self._watch.overload.cameras,
-            room=room_for(self.rig, free or 0),
-            preroll_s=self._recorder.preroll_s,
-            holding_s=time.monotonic() - self.recordings.emptied_at,
-            recording=current.view() if current is not None and not current.opening else None,
-            last_recording=self.recordings.last,
-            last_jump=self._last_jump,
-            next_jumper=self._jumpers.shown if self.recordings.opening else self._jumpers.view().next,
-            pids={} if processes is None else processes.pids,
-            restarts={RECORDER: self._fault.deaths, **(processes.restarts if processes else {})},
-        )
-        return picture(self.rig, facts)
-
-
-def _level(jump: LastJump) -> Level:
-    return Level.INFO if jump.ok or jump.live else Level.WARNING

@@ -218,7 +218,7 @@ def _measurings(data: Path, supervisor: Supervisor, jumps: MeasuredJumps) -> Mea
 
     def found(jumps: tuple[LastJump, ...]) -> None:
         with suppress(ProcessDiedError):  # the service ends; the result is on the disk
-            supervisor.commands.ask(at_once(partial(supervisor.know_jumps, jumps)), _SOON_S)
+            supervisor.commands.ask(at_once(partial(supervisor.board.know_jumps, jumps)), _SOON_S)
 
     earlier, hub = jumps.others_of_athlete, supervisor.hub
     made = Measurings(data, lambda: supervisor.rig, busy, earlier, hub.tell, found, hub.wake)

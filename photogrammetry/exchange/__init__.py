@@ -1,1 +1,1 @@
-"""Files of other programs: COLMAP, OpenCV, PhotoModeler, AICON, surveys; carried over into `svev-network/1`."""
+"""Files of other programs: COLMAP, OpenCV, PhotoModeler, AICON, surveys; into and out of `svev-network/1`."""

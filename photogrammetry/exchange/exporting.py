@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from photogrammetry.exchange.camera_toml import camera_toml
-from photogrammetry.exchange.pinhole import Pinhole
-from photogrammetry.exchange.pinhole_of import pinhole_of, pose_of
+from photogrammetry.exchange.vision.camera_toml import camera_toml
+from photogrammetry.exchange.vision.pinhole import Pinhole
+from photogrammetry.exchange.vision.pinhole_of import pinhole_of, pose_of
 from photogrammetry.network.file_writer import metric_to_pixel
 from photogrammetry.network.model import Image, ImageFrame, Network
 from rig.arrays import Floats

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from photogrammetry.exchange.camera_toml import read_camera_toml
-from photogrammetry.exchange.colmap import FILES, read_colmap
 from photogrammetry.exchange.columns import read_aicon, read_survey_csv
-from photogrammetry.exchange.opencv import read_opencv
 from photogrammetry.exchange.part import Part, joined
 from photogrammetry.exchange.photomodeler import read_photomodeler
 from photogrammetry.exchange.table import ENDINGS
+from photogrammetry.exchange.vision.camera_toml import read_camera_toml
+from photogrammetry.exchange.vision.colmap import FILES, read_colmap
+from photogrammetry.exchange.vision.opencv import read_opencv
 from photogrammetry.network.file import network_from_json
 from photogrammetry.network.model import Network
 from rig.errors import BadInputError

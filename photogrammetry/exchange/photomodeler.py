@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from photogrammetry.exchange.part import Part, numbers, rotation_of
-from photogrammetry.exchange.pinhole import doubts
+from photogrammetry.exchange.vision.pinhole import doubts
 from photogrammetry.network.model import ImageFrame
 from rig.errors import BadInputError
 from rig.settings.strict_toml import read_text

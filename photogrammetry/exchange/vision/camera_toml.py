@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from photogrammetry.exchange.part import Part
-from photogrammetry.exchange.pinhole import Pinhole, camera_entry, pose_entry
+from photogrammetry.exchange.vision.pinhole import Pinhole, camera_entry, pose_entry
 from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.entries import Finite, Triple
 from photogrammetry.network.model import ImageFrame

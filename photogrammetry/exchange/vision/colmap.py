@@ -10,9 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from photogrammetry.exchange.colmap_binary import text_of
 from photogrammetry.exchange.part import Part, numbers
-from photogrammetry.exchange.pinhole import Pinhole, camera_entry, pose_entry
+from photogrammetry.exchange.vision.colmap_binary import text_of
+from photogrammetry.exchange.vision.pinhole import Pinhole, camera_entry, pose_entry
 from photogrammetry.network.model import ImageFrame
 from rig.arrays import Floats
 from rig.errors import BadInputError

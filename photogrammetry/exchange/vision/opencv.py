@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from photogrammetry.exchange.part import Part
-from photogrammetry.exchange.pinhole import Pinhole, camera_entry, pose_entry
-from photogrammetry.exchange.values import read_values
+from photogrammetry.exchange.vision.pinhole import Pinhole, camera_entry, pose_entry
+from photogrammetry.exchange.vision.values import read_values
 from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.entries import LARGEST
 from photogrammetry.network.model import ImageFrame

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import least_squares
 
-from photogrammetry.exchange.pinhole import Pinhole
+from photogrammetry.exchange.vision.pinhole import Pinhole
 from photogrammetry.geometry.camera_model import distort, undistort
 from photogrammetry.geometry.rotation import vector_from_rotation
 from photogrammetry.network.model import Camera, Image

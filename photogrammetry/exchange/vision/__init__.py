@@ -1,0 +1,1 @@
+"""Files of computer vision (OpenCV, COLMAP, anipose): y down, z forward."""

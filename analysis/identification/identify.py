@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook
 from analysis.identification.markers.markers import BINDINGS, Markers, follow_further, follow_markers
-from analysis.identification.markers.refinement import refined
+from analysis.identification.markers.refinement import only_worn, refined
 from analysis.identification.markers.synchrony import lateness
 from analysis.identification.over_time.flights import Flight, find_flights, find_tracks
 from analysis.identification.over_time.window import Window
@@ -150,6 +150,8 @@ class Sighting:
         if look is not None and not briefly:
             markers = follow_further(views, window, flight, markers, look)
             markers = refined(views, window, flight, markers, self.appearance, look)
+        elif look is not None:
+            markers = only_worn(views, window, flight, markers, self.appearance, look)
         if not _is_jumper(np.asarray(np.any(markers.assigned.rays >= 0, axis=2))):
             return ()
         steps = np.ones(len(window), bool)

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.identification.space.body import USUAL, implausibility
+from analysis.identification.space.body import USUAL, implausibility, log_spread
 from analysis.measurements.model import POINTS, SIDES, ImageMeasurements, JumpMeasurements
 from analysis.motion.quantities import NEEDS
 from analysis.result.model import QUANTITIES, JumperState, SmoothedState, Status
@@ -36,8 +36,9 @@ def told_names(states: Sequence[JumperState]) -> frozenset[str]:
 
     - Helmet and hip by each other: nothing else that goes with a body is as far from each other in that direction.
     - A binding by its ski. Where hardly any ski was found, bindings by all four at once, if they look like a body.
-    - The helmet without the hip, or the other way round, by told bindings: it is where it must be beside them, and the
-      other one would not be there.
+    - The helmet without the hip, or the other way round, by told bindings: it is where it must be beside them, and in
+      several pulses the other one would hardly be there. A hip in the crouch on the table may as well be a helmet, in
+      flight a helmet is farther from the bindings; and never is a hip where a helmet is then.
 
     Bindings of which one lies ahead of the other along the skis are not told: one of them is something else.
     """
@@ -60,7 +61,7 @@ def told_names(states: Sequence[JumperState]) -> frozenset[str]:
     if not told.issuperset(_BODY) and not body.contradicts(_BODY[0], _BODY[1:]):
         bindings = told.intersection(p for p, _ in _BINDINGS)
         for name, other in (_BODY, _BODY[::-1]):
-            if any(body.looks((binding, name)) and not body.looks((binding, name), other) for binding in bindings):
+            if any(body.looks((binding, name)) and body.rather((binding, name), other) for binding in bindings):
                 told.add(name)
     return frozenset(told)
 
@@ -168,6 +169,18 @@ class _Body:
         """
         squares = self._squares(pair, second)
         return len(squares) >= _FEWEST and float(np.median(squares)) < USUAL
+
+    def rather(self, pair: tuple[str, str], second: str) -> bool:
+        """Whether the second point of a pair is what it is named rather than `second`.
+
+        Poses of one body over a jump are no independent draws, so that likelihoods are not multiplied: the pulses that
+        tell the two apart best decide, and most others must not say otherwise.
+        """
+        one, other = map(POINTS.index, pair)
+        more = log_spread(one, POINTS.index(second)) - log_spread(one, other)
+        ratios = self._squares(pair, second) - self._squares(pair) + more
+        telling = len(ratios) >= _FEWEST and float(np.sort(ratios)[-_FEWEST]) >= USUAL
+        return bool(telling and np.median(ratios) > 0.0)
 
     def contradicts(self, name: str, others: Collection[str]) -> bool:
         """Whether a point does not look like what it is named beside some others."""

@@ -41,6 +41,7 @@ def _renamed(
 
 
 _RIGHT: Final = {name: name for name in POINTS}
+_NO_HELMET: Final = {name: name for name in POINTS if name != "P1"}
 _NO_HIP: Final = {name: name for name in POINTS if name != "P2"}
 
 
@@ -51,6 +52,11 @@ _NO_HIP: Final = {name: name for name in POINTS if name != "P2"}
         pytest.param(_NO_HIP, ("right", "left"), "P1 P3 P4", id="bindings on skis, and no hip is so far from them"),
         pytest.param(_NO_HIP, ("left",), "P1 P4", id="of a binding without its ski another thing may be the marker"),
         pytest.param(_NO_HIP, (), "", id="three markers alone"),
+        pytest.param(
+            _NO_HELMET, ("right", "left"), "P2 P3 P4", id="bindings on skis, and no helmet is so near in flight"
+        ),
+        pytest.param(_NO_HELMET, (), "", id="hip and bindings alone"),
+        pytest.param({"P1": "P2", "P3": "P3", "P4": "P4"}, ("right", "left"), "P3 P4", id="the helmet as the hip"),
         pytest.param({"P1": "P1", "P2": "P2"}, (), "P1 P2", id="helmet and hip tell each other"),
         pytest.param({"P2": "P1", "P4": "P4"}, ("left",), "P4", id="the hip as the helmet"),
         pytest.param({"P1": "P3", "P2": "P4", "P3": "P1", "P4": "P2"}, (), "", id="not like a body"),

@@ -6,7 +6,7 @@ Their light is told by the spots of each, where one is in the shade. What is har
 face, where the helmet has none.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,6 +55,12 @@ class _Places:
     radius: Floats
     streak: Floats
 
+    def only_named(self) -> "_Places":
+        """Those at spots with a name."""
+        at = np.flatnonzero(self.named)
+        step, spot = ([of[i] for i in at.tolist()] for of in (self.step, self.spot))
+        return _Places(step, spot, self.marker[at], self.named[at], self.xy[at], self.radius[at], self.streak[at])
+
 
 def refined(
     views: Views, window: Window, flight: Flight, markers: Markers, appearance: Appearance, look: SecondLook
@@ -64,25 +70,71 @@ def refined(
     The spots of the window are replaced: covered ones move to where their whole disc is. Markers that are not worn lose
     their names.
     """
-    sights = views.see_all(markers.predicted.xyz.reshape(-1, 3))
     changed: set[int] = set()
-    spots_of, discs_of = np.zeros(len(POINTS)), np.zeros(len(POINTS))
-    for k, radius in enumerate(_radii(views, window, flight, markers, sights)):
-        places = _places(views, window, flight, markers, k, sights[k], radius)
-        if not len(places.xy):
-            continue
-        shape = DiscShape(places.radius, _SPREAD, places.streak, appearance.contrast, appearance.sigma)
-        discs = _fitted(views, window, k, places, shape, look)
-        spots_of += np.bincount(places.marker[places.named], minlength=len(POINTS))
-        discs_of += np.bincount(places.marker[places.named & _itself(places, discs)], minlength=len(POINTS))
+    seen = _Seen()
+    for k, places, discs in _fits(views, window, flight, markers, appearance, look):
+        seen.add(places, discs)
         for t in sorted(set(places.step)):
             own = np.flatnonzero(np.array(places.step) == t)
             spots = window.candidates[t].images[views.names[k]].spots
             window.put(t, k, _replaced(spots, places, discs, own, appearance.contrast))
             changed.add(t)
     window.renew(sorted(changed))
-    worn = _worn(spots_of, discs_of)
+    worn = seen.worn()
     return _only(settled_again(views, window, flight, _only(markers, worn)), worn)
+
+
+def only_worn(
+    views: Views, window: Window, flight: Flight, markers: Markers, appearance: Appearance, look: SecondLook
+) -> Markers:
+    """The markers without the names of those that are not worn, as in `refined`; nothing is measured again."""
+    seen = _Seen()
+    for _, places, discs in _fits(views, window, flight, markers, appearance, look, named=True):
+        seen.add(places, discs)
+    return _only(markers, seen.worn())
+
+
+def _fits(
+    views: Views,
+    window: Window,
+    flight: Flight,
+    markers: Markers,
+    appearance: Appearance,
+    look: SecondLook,
+    *,
+    named: bool = False,
+) -> Iterator[tuple[int, _Places, Spots]]:
+    """By camera (its index): places and the discs that are fitted near them; `named`: only at spots with names."""
+    sights = views.see_all(markers.predicted.xyz.reshape(-1, 3))
+    for k, radius in enumerate(_radii(views, window, flight, markers, sights)):
+        places = _places(views, window, flight, markers, k, sights[k], radius)
+        if named:
+            places = places.only_named()
+        if len(places.xy):
+            shape = DiscShape(places.radius, _SPREAD, places.streak, appearance.contrast, appearance.sigma)
+            yield k, places, _fitted(views, window, k, places, shape, look)
+
+
+class _Seen:
+    """How many named spots of each marker are discs."""
+
+    def __init__(self) -> None:
+        self._spots, self._discs = np.zeros(len(POINTS)), np.zeros(len(POINTS))
+
+    def add(self, places: _Places, discs: Spots) -> None:
+        """Count those of a camera."""
+        self._spots += np.bincount(places.marker[places.named], minlength=len(POINTS))
+        self._discs += np.bincount(places.marker[places.named & _itself(places, discs)], minlength=len(POINTS))
+
+    def worn(self) -> Flags:
+        """Which markers (4,) are markers.
+
+        In some pictures hardly any marker is a disc that can be fitted; then nothing is told.
+        """
+        share = self._discs / np.maximum(self._spots, 1.0)
+        enough = self._spots >= _FEW
+        usual = float(np.median(share[enough])) if enough.any() else 0.0
+        return np.asarray(~enough | (share >= _MOST * usual) | (usual < _MOST))
 
 
 def _fitted(views: Views, window: Window, k: int, places: _Places, shape: DiscShape, look: SecondLook) -> Spots:
@@ -105,17 +157,6 @@ def _fitted(views: Views, window: Window, k: int, places: _Places, shape: DiscSh
         if np.count_nonzero(named & _itself(places, again)) > count:
             discs = again
     return discs
-
-
-def _worn(spots: Floats, discs: Floats) -> Flags:
-    """Which markers (4,) of so many named spots, of which so many are discs, are markers.
-
-    In some pictures hardly any marker is a disc that can be fitted; then nothing is told.
-    """
-    share = discs / np.maximum(spots, 1.0)
-    enough = spots >= _FEW
-    usual = float(np.median(share[enough])) if enough.any() else 0.0
-    return np.asarray(~enough | (share >= _MOST * usual) | (usual < _MOST))
 
 
 def _itself(places: _Places, discs: Spots) -> Flags:

@@ -52,3 +52,17 @@ def implausibility(one: int, other: int, difference: Floats) -> Floats:
     length, spread = _DISTANCES[names]
     apart = (np.linalg.norm(difference, axis=1) - length) / spread
     return np.asarray((((difference - mean) / sigma) ** 2).sum(axis=1) + apart**2)
+
+
+def log_spread(one: int, other: int) -> float:
+    """Logarithm of the product of the variances in `implausibility`: the more freely two points lie, the larger.
+
+    Where a point may be either of two things, this belongs to the squared deviations: -2 ln of the likelihood.
+
+    Args:
+        one: index into `POINTS`.
+        other: likewise.
+    """
+    names = POINTS[one], POINTS[other]
+    key = names if names in _DIFFERENCES else names[::-1]
+    return 2.0 * float(np.log((*_DIFFERENCES[key][1], _DISTANCES[key][1])).sum())

@@ -1,17 +1,19 @@
 """Candidates as a detector would give them of simulated jumps: markers without names, and much else."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from analysis.candidates.foreground.background import Region
+from analysis.candidates.markers.known_discs import DiscShape
 from analysis.candidates.model import ImageCandidates, PulseCandidates, Spots
 from analysis.measurements.model import POINTS
 from analysis.scene.camera_system import CameraSystem
-from rig.arrays import Floats
+from rig.arrays import Floats, Integers
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
-from tests.analysis.simulated import SIGMA_PX, START_NS, TrueJump
+from tests.analysis.simulated import SIGMA_PX, START_NS, TrueJump, true_cameras, true_jump
 
 
 @dataclass(frozen=True)
@@ -118,3 +120,46 @@ FRAMES: dict[int, tuple[Floats, Floats]] = {}
 
 def _inside(place: Floats, size: Floats) -> bool:
     return bool(((place >= 0) & (place <= size - 1)).all())
+
+
+@dataclass
+class SimulatedLook:
+    """Finds every marker that lies within 4 sigma of the expected place.
+
+    Attributes:
+        light: contrast of the disc of each marker; one whose spots have another contrast is none.
+    """
+
+    light: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(POINTS, 80.0))
+
+    def look_for_spots(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, covariance: Floats) -> list[Spots]:
+        """See `SecondLook`."""
+        return [self._near(*of, camera) for of in zip(pulses, xy, covariance, strict=True)]
+
+    def _near(self, pulse: PulseNumber, xy: Floats, covariance: Floats, camera: str) -> Spots:
+        placed = true_cameras()[camera]
+        places = [
+            placed.project(marker)
+            for marker in true_jump(7).pose(pulse).markers
+            if (off := placed.project(marker) - xy) @ np.linalg.solve(covariance, off) < 16
+        ]
+        n = len(places)
+        sigma = np.tile(SIGMA_PX**2 * np.eye(2), (n, 1, 1))
+        return Spots(np.reshape(places, (n, 2)), sigma, np.full(n, 1.6), np.full(n, 80.0), np.full(n, 4.0))
+
+    def part(self, pulse: PulseNumber, camera: str, low: Integers, high: Integers) -> Region | None:
+        """See `SecondLook`; there are no images."""
+
+    def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:
+        """See `SecondLook`."""
+        n = len(pulses)
+        discs = Spots(np.full_like(xy, np.nan), np.tile(np.eye(2), (n, 1, 1)), shape.radius, np.zeros(n), np.zeros(n))
+        for i, pulse in enumerate(pulses):
+            places = true_cameras()[camera].project(true_jump(7).pose(pulse).markers)
+            nearest = int(np.linalg.norm(places - xy[i], axis=1).argmin())
+            light = self.light[POINTS[nearest]]
+            like = abs(light - shape.contrast) < 2 * shape.sigma_contrast
+            if like and np.linalg.norm(places[nearest] - xy[i]) < shape.radius[i]:
+                discs.xy[i], discs.covariance[i] = places[nearest], SIGMA_PX**2 * np.eye(2)
+                discs.contrast[i], discs.strength[i] = light, 20.0
+        return discs

@@ -1,13 +1,11 @@
 """Identification on candidates with much that is neither marker nor ski."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from analysis.candidates.foreground.background import Region
-from analysis.candidates.markers.known_discs import DiscShape
 from analysis.candidates.model import ImageCandidates, Spots
 from analysis.identification.identify import identify
 from analysis.identification.markers.markers import Markers
@@ -16,9 +14,8 @@ from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.window import Window
 from analysis.identification.space.views import Views
 from analysis.measurements.model import POINTS, JumpMeasurements
-from rig.arrays import Floats, Integers
-from rig.pulse import PulseNumber
-from tests.analysis.identification.cluttered import Disturbed, Scene, scene
+from rig.arrays import Floats
+from tests.analysis.identification.cluttered import Disturbed, Scene, SimulatedLook, scene
 from tests.analysis.simulated import RATE_HZ, SIGMA_PX, true_cameras, true_jump
 
 PULSES = range(15, 70)
@@ -147,49 +144,6 @@ def test_rays_lose_the_names_that_they_got_from_untold_points() -> None:
     assert _share(jumps, made) > 0.93
 
 
-@dataclass
-class _SecondLook:
-    """Finds every marker that lies within 4 sigma of the expected place.
-
-    Attributes:
-        light: contrast of the disc of each marker; one whose spots have another contrast is none.
-    """
-
-    light: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(POINTS, 80.0))
-
-    def look_for_spots(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, covariance: Floats) -> list[Spots]:
-        """See `SecondLook`."""
-        return [self._near(*of, camera) for of in zip(pulses, xy, covariance, strict=True)]
-
-    def _near(self, pulse: PulseNumber, xy: Floats, covariance: Floats, camera: str) -> Spots:
-        placed = true_cameras()[camera]
-        places = [
-            placed.project(marker)
-            for marker in true_jump(7).pose(pulse).markers
-            if (off := placed.project(marker) - xy) @ np.linalg.solve(covariance, off) < 16
-        ]
-        n = len(places)
-        sigma = np.tile(SIGMA_PX**2 * np.eye(2), (n, 1, 1))
-        return Spots(np.reshape(places, (n, 2)), sigma, np.full(n, 1.6), np.full(n, 80.0), np.full(n, 4.0))
-
-    def part(self, pulse: PulseNumber, camera: str, low: Integers, high: Integers) -> Region | None:
-        """See `SecondLook`; there are no images."""
-
-    def fit_discs(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, shape: DiscShape) -> Spots:
-        """See `SecondLook`."""
-        n = len(pulses)
-        discs = Spots(np.full_like(xy, np.nan), np.tile(np.eye(2), (n, 1, 1)), shape.radius, np.zeros(n), np.zeros(n))
-        for i, pulse in enumerate(pulses):
-            places = true_cameras()[camera].project(true_jump(7).pose(pulse).markers)
-            nearest = int(np.linalg.norm(places - xy[i], axis=1).argmin())
-            light = self.light[POINTS[nearest]]
-            like = abs(light - shape.contrast) < 2 * shape.sigma_contrast
-            if like and np.linalg.norm(places[nearest] - xy[i]) < shape.radius[i]:
-                discs.xy[i], discs.covariance[i] = places[nearest], SIGMA_PX**2 * np.eye(2)
-                discs.contrast[i], discs.strength[i] = light, 20.0
-        return discs
-
-
 def _all_are_true(jump: JumpMeasurements) -> None:
     """Whether all named points are where their markers are."""
     for pulse in jump.pulses:
@@ -206,7 +160,7 @@ def test_what_is_no_disc_like_the_markers_is_none_and_a_marker_in_the_shade_is_o
     lights = dict.fromkeys(POINTS, 80.0) | {marker: 40.0}
     dim = Disturbed(light={marker: 0.5})
     made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), PULSES, dim)
-    for look, named in ((_SecondLook(lights), True), (_SecondLook({**lights, marker: 1e9}), False)):
+    for look, named in ((SimulatedLook(lights), True), (SimulatedLook({**lights, marker: 1e9}), False)):
         (jump,) = identify(made.candidates, true_cameras(), RATE_HZ, None, look)
         found = {label for pulse in jump.pulses for image in pulse.images.values() for label in image.points}
         assert found == {label for label in POINTS if named or label != marker}
@@ -219,6 +173,6 @@ def test_a_second_look_adds_what_was_missed() -> None:
 
     system = true_cameras()
     before = identify(made.candidates, system, RATE_HZ)
-    after = identify(made.candidates, system, RATE_HZ, None, _SecondLook())
+    after = identify(made.candidates, system, RATE_HZ, None, SimulatedLook())
     assert _share(after, made) > 1.25 * _share(before, made)
     _all_are_true(after[0])

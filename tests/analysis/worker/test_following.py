@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from analysis.identification.seeking import Seeker
-from analysis.measurements.model import MeasuredCamera
+from analysis.measurements.model import POINTS, MeasuredCamera
 from analysis.result.model import Status
 from analysis.worker.following import Followed, Follower
-from tests.analysis.identification.cluttered import Disturbed, scene
+from tests.analysis.identification.cluttered import Disturbed, SimulatedLook, scene
 from tests.analysis.simulated import RATE_HZ, true_cameras, true_jump
 
 BEGUN, SHOWN, LAST = 28, 34, 54  # pulses: he is found, his bindings are hidden until here, the end
@@ -92,3 +92,21 @@ def test_markers_whose_names_nothing_bears_out_are_not_told(hidden: tuple[str, .
         assert {label for label, point in followed.state.points.items() if point is not None} == given
         assert (followed.state.height is not None) == bool(given)
         assert all(ski is None for ski in followed.state.skis.values())
+
+
+@pytest.mark.parametrize("worn", [False, True])
+def test_what_is_no_disc_like_the_markers_is_not_followed_as_one(*, worn: bool) -> None:
+    """A face where the helmet has no marker: the whole jump says so at its end, and every state before."""
+    system, truth = true_cameras(), true_jump(7)
+    made = scene([truth], system, np.random.default_rng(1), range(15, 40), Disturbed(5, light={"P1": 0.5}))
+    look = SimulatedLook(dict.fromkeys(POINTS, 80.0) | {"P1": 40.0 if worn else 1e9})
+    cameras = {name: MeasuredCamera((640, 480), 0.0) for name in system.names}
+    seeker, follower, told = Seeker(system, {}), Follower(system, cameras, RATE_HZ), []
+    assert follower.find(seeker, made.candidates[:SOUGHT], look=look)
+    for end in range(SOUGHT, len(made.candidates)):
+        told.append(follower.follow(made.candidates[end], look))
+        again = Follower(system, cameras, RATE_HZ)
+        if follower.look_is_due() and again.find(seeker, made.candidates[end - SOUGHT : end + 1], look=look):
+            assert worn or not again.knows_more_than(follower)
+    assert any(_measured(followed, "P1") for followed in told) == worn
+    assert sum(_measured(followed, "P4") for followed in told) > len(told) / 2 or not worn

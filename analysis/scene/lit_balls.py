@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.scene.camera_system import PlacedCamera, camera_system
 from analysis.scene.detection import Detections
-from analysis.scene.lit_fit import fit_lit_balls
+from analysis.scene.lit_fit import CommonLight, LitBalls, fit_lit_balls
 from analysis.scene.lit_windows import sighted
 from analysis.scene.static_image import StaticImage
 from photogrammetry.network.file import pixel_to_metric
@@ -40,7 +40,7 @@ class MeasuredBalls:
         sigma: (n, 2) px.
         whole: (n,) whether a sphere explains it.
         share: (n,) radius of the disc over that of the ball.
-        radius: of the balls, metres.
+        light: in which they were measured.
         estimated: whether the radius was estimated from the images.
     """
 
@@ -48,7 +48,7 @@ class MeasuredBalls:
     sigma: Floats
     whole: Flags
     share: Floats
-    radius: float
+    light: CommonLight
     estimated: bool
 
     def messages(self, camera: Integers, cameras: Sequence[str], balls: Sequence[str]) -> list[Phrase]:
@@ -81,7 +81,7 @@ class MeasuredBalls:
                 "the radius of the balls is not given; {radius:.3f} m fits the images best; measure it and give it as "
                 '"ball_radius_m" in the survey: a wrong radius moves all balls of an image alike'
             )
-            said.append(phrase("scene_radius", text, radius=self.radius))
+            said.append(phrase("scene_radius", text, radius=self.light.radius))
         return said
 
 
@@ -91,10 +91,14 @@ class LitNetwork:
 
     Attributes:
         network: with these centres, and with the radius of the balls.
+        cameras: names of those that show them.
+        light: in which they were measured, for these cameras.
         messages: what a person should know.
     """
 
     network: Network
+    cameras: tuple[str, ...]
+    light: CommonLight
     messages: tuple[Phrase, ...]
 
 
@@ -123,22 +127,24 @@ def measure_balls(
     apparent = size / balls.radius_px(1.0)
     start = _start_radius(apparent, camera, bright) if radius is None else radius
     lit = fit_lit_balls([static[one.name] for one in placed], balls, start, known=radius is not None)
-    true_size = balls.radius_px(lit.radius)
+    true_size = balls.radius_px(lit.light.radius)
     sigma = np.sqrt(np.diagonal(lit.covariance, axis1=1, axis2=2))
-    whole = np.asarray(
-        (lit.explained > _EXPLAINED)
-        & (sigma.max(axis=1) < _WORST_SIGMA)
-        & (np.hypot(*(lit.xy - disc).T) < np.maximum(1.0, _FARTHEST * true_size))
-    )
+    whole = is_ball(lit) & (np.hypot(*(lit.xy - disc).T) < np.maximum(1.0, _FARTHEST * true_size))
     of_disc = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2) + (_DISC_SIGMA * true_size[:, None]) ** 2)
     return MeasuredBalls(
         np.where(whole[:, None], lit.xy, disc),
         np.where(whole[:, None], sigma, of_disc),
         whole,
-        apparent / lit.radius,
-        lit.radius,
+        apparent / lit.light.radius,
+        lit.light,
         radius is None,
     )
+
+
+def is_ball(lit: LitBalls) -> Flags:
+    """Which of n measured balls (n,) a sphere in the common light explains."""
+    sigma = np.sqrt(np.diagonal(lit.covariance, axis1=1, axis2=2))
+    return np.asarray((lit.explained > _EXPLAINED) & (sigma.max(axis=1) < _WORST_SIGMA))
 
 
 def with_lit_balls(
@@ -163,8 +169,8 @@ def with_lit_balls(
     xy, sigma = o.xy.copy(), o.sigma.copy()
     xy[row], sigma[row] = pixel_to_metric(measured.xy, sizes), measured.sigma
     points = [network.points[int(point)].name for point in o.point[row]]
-    changed = replace(network, observations=replace(o, xy=xy, sigma=sigma), ball_radius_m=measured.radius)
-    return LitNetwork(changed, tuple(measured.messages(camera, names, points)))
+    changed = replace(network, observations=replace(o, xy=xy, sigma=sigma), ball_radius_m=measured.light.radius)
+    return LitNetwork(changed, names, measured.light, tuple(measured.messages(camera, names, points)))
 
 
 def with_scatter(network: Network, orientation: Orientation) -> Network:

@@ -44,13 +44,37 @@ class LitBalls:
         xy: (n, 2) centres, px.
         covariance: (n, 2, 2) px^2.
         explained: (n,) share of the variance around the background that the ball explains.
-        radius: of the balls, metres.
+        light: in which they were measured.
     """
 
     xy: Floats
     covariance: Floats
     explained: Floats
-    radius: float
+    light: "CommonLight"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommonLight:
+    """What all balls of a log have in common.
+
+    Attributes:
+        unit: grey value of the balls.
+        common: light in that unit, log gain and log blur of each camera, log radius of the balls (metres).
+    """
+
+    unit: float
+    common: Floats
+
+    @property
+    def radius(self) -> float:
+        """Of the balls, metres."""
+        return float(np.exp(self.common[-1]))
+
+    def only(self, cameras: Integers) -> "CommonLight":
+        """For some of the cameras, by index."""
+        count = (len(self.common) - LIGHT - 1) // 2
+        own = np.concatenate((np.arange(LIGHT), LIGHT + cameras, LIGHT + count + cameras, [LIGHT + 2 * count]))
+        return CommonLight(self.unit, self.common[own])
 
 
 @dataclass(slots=True, eq=False)
@@ -60,7 +84,7 @@ class _State:
 
 
 def fit_lit_balls(static: Sequence[StaticImage], balls: SightedBalls, radius: float, *, known: bool) -> LitBalls:
-    """Measure balls.
+    """Measure balls, and the light that they have in common.
 
     Args:
         static: image of each camera.
@@ -73,10 +97,12 @@ def fit_lit_balls(static: Sequence[StaticImage], balls: SightedBalls, radius: fl
     common[LIGHT + cameras : LIGHT + 2 * cameras] = log(_BLUR)
     common[-1] = log(radius)
     common[0] = 1.0
-    fit = _Fit(static, balls, _State(balls.xy.copy(), common), known)
+    spread = np.concatenate((_LIGHT_SPREAD, np.full(cameras, _GAIN_SPREAD), np.full(cameras, _BLUR_SPREAD), [_HELD]))
+    fit = _Fit(static, balls, common, spread)
     fit.adjust(_STEPS, clipped=False)
     fit.weigh(clipped=False)
-    fit.release_radius()
+    if not known:
+        fit.release_radius()
     fit.again()
     fit.adjust(_STEPS, clipped=True)
     for _ in range(2):
@@ -85,30 +111,51 @@ def fit_lit_balls(static: Sequence[StaticImage], balls: SightedBalls, radius: fl
     return fit.result()
 
 
-class _Fit:
-    """The adjustment."""
+def fit_in_known_light(static: Sequence[StaticImage], balls: SightedBalls, light: CommonLight) -> LitBalls:
+    """Measure balls in the light of others.
 
-    def __init__(self, static: Sequence[StaticImage], balls: SightedBalls, state: _State, known: bool) -> None:
-        self._static, self._balls, self._known = static, balls, known
-        self.state = state
+    Args:
+        static: image of each camera.
+        balls: where they should be, and how the cameras see them.
+        light: of the others.
+    """
+    fit = _Fit(static, balls, light.common, np.full(len(light.common), _HELD), light.unit)
+    fit.adjust(_STEPS, clipped=True)
+    fit.again()
+    fit.weigh(clipped=True)
+    fit.adjust(_STEPS_AGAIN, clipped=True)
+    return fit.result()
+
+
+class _Fit:
+    """The adjustment.
+
+    Args:
+        static, balls: as `fit_lit_balls`.
+        common: what the balls have in common, to begin with (`CommonLight.common`).
+        spread: standard deviations of that.
+        unit: grey value of the balls; None: that of the brightest pixels of these.
+    """
+
+    def __init__(
+        self,
+        static: Sequence[StaticImage],
+        balls: SightedBalls,
+        common: Floats,
+        spread: Floats,
+        unit: float | None = None,
+    ) -> None:
+        self._static, self._balls = static, balls
+        self.state = _State(balls.xy.copy(), common.copy())
         self._windows = self._cut()
         self._model = np.full(len(balls), _MODEL_START)
-        self._unit, self._contrast = self._brightness()
-        cameras = len(static)
-        spread = np.concatenate(
-            (
-                _LIGHT_SPREAD,
-                np.full(cameras, _GAIN_SPREAD),
-                np.full(cameras, _BLUR_SPREAD),
-                [_HELD],
-            )
-        )
-        self._prior, self._prior_weight = state.common.copy(), spread**-2
+        brightest, self._contrast = self._brightness()
+        self._unit = brightest if unit is None else unit
+        self._prior, self._prior_weight = common.copy(), spread**-2
 
     def release_radius(self) -> None:
-        """Estimate the radius from here on, if it is not known; in a light that is not clipped it has no optimum."""
-        if not self._known:
-            self._prior_weight[-1] = _RADIUS_SPREAD**-2
+        """Estimate the radius from here on; in a light that is not clipped it has no optimum."""
+        self._prior_weight[-1] = _RADIUS_SPREAD**-2
 
     def _cut(self) -> list[Windows]:
         radius = float(np.exp(self.state.common[-1]))
@@ -261,7 +308,7 @@ class _Fit:
             self.state.xy,
             own + shared,
             explained,
-            float(np.exp(self.state.common[-1])),
+            CommonLight(self._unit, self.state.common),
         )
 
     def _sandwich(self, group: Windows, design: Floats, variance: Floats, inverse: Floats) -> Floats:

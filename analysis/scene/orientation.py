@@ -18,6 +18,7 @@ from analysis.scene.lit_balls import with_lit_balls, with_scatter
 from analysis.scene.measured_network import View, measured_network
 from analysis.scene.naming import Naming, NotNamedError, Spots, name_balls
 from analysis.scene.reflection import with_better_pose
+from analysis.scene.sought_balls import with_sought_balls
 from analysis.scene.static_image import StaticImage, static_images
 from analysis.scene.survey import KnownPoints, Survey, check_lengths
 from analysis.scene.ties import Station, Tie, ball_size, find_ties
@@ -158,6 +159,7 @@ def orient_images(
     network, notes = measured_network(views, namings, ties, survey, known)
     orientation = orient(network, uncertain_interior=True)
     lit = with_lit_balls(network, orientation, static, found)
+    lit = with_sought_balls(lit, orient(lit.network, uncertain_interior=True), static, survey)
     network = with_scatter(lit.network, orient(lit.network, uncertain_interior=True))
     orientation = orient(network, uncertain_interior=True)
     if len(orientation.outcome.adjustment.network.images) < _FEWEST_CAMERAS:

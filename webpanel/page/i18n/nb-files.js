@@ -67,6 +67,7 @@ export const files = {
   scene_balls_lost: ["innmålte baller som ikke finnes i noe bilde: {balls}"],
   scene_light_aside: ["kamera {camera}: lyset kommer fra siden: ballene ser {share} ganger så store ut som de er; midtpunktene er målt med dette lyset"],
   scene_balls_covered: ["kamera {camera}: ikke sett som hele baller i samme lys som de andre, så de teller lite: {balls}"],
+  scene_balls_sought: ["kamera {camera}: bare sett der plasseringen sier at de er: {balls}"],
   scene_radius: ['radien til ballene er ikke oppgitt; {radius} m passer best til bildene; mål den og oppgi den som "ball_radius_m" i innmålingen: en feil radius flytter alle ballene i et bilde likt'],
   scene_not_oriented: ["kamera {camera} er ikke orientert: {why}"],
   scene_no_image: ["kamera {camera} i innmålingen har ikke noe bilde i loggen"],

@@ -6,12 +6,14 @@ something else that is round: names sort that out (`analysis.scene.naming`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scipy.special import chdtri
 
 from analysis.scene.disc import MARGIN, Disc, fit_discs
+from analysis.scene.shaded_disc import fit_shaded_discs
 from analysis.scene.static_image import GreyImage, StaticImage
 from rig.arrays import Floats, Integers
 
@@ -30,6 +32,7 @@ _MISFIT_AT_START = 0.3  # the same for a disc where the blob is, before it is fi
 _WORST_SIGMA = 0.35  # px
 _SPOILT = 1.5  # times the noise: with larger residuals something lies close around a ball
 _TIGHT = 1.8  # px around a ball that are fitted then
+_CONTRADICTION = float(chdtri(2, 0.001))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +98,25 @@ def _fitted(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> list[Dis
     for i, disc in zip(spoilt, fitted(np.array(spoilt, int), _TIGHT), strict=True):
         found[i].append(disc)
     balls = [[disc for disc in of_place if disc is not None and _is_ball(disc)] for of_place in found]
-    return [min(of_place, key=lambda disc: disc.factor) for of_place in balls if of_place]
+    shaded = fit_shaded_discs(grey, sigma, xy, radius)
+    return [
+        best
+        for plain, other in zip(balls, shaded, strict=True)
+        if (best := _best(plain, other if other is not None and _is_ball(other) else None)) is not None
+    ]
+
+
+def _best(plain: Sequence[Disc], shaded: Disc | None) -> Disc | None:
+    """The best plain disc, or else the shaded one; where they contradict each other, by so much it is not known."""
+    if not plain:
+        return shaded
+    best = min(plain, key=lambda disc: disc.factor)
+    if shaded is None:
+        return best
+    off = shaded.xy - best.xy
+    if off @ np.linalg.solve(best.covariance + shaded.covariance, off) < _CONTRADICTION:
+        return best
+    return replace(best, covariance=best.covariance + np.outer(off, off))
 
 
 def _quality(disc: Disc) -> float:

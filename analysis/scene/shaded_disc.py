@@ -1,0 +1,189 @@
+"""Fits discs that a light shades, before a ground that no plane describes: a ball in the sun, half before its plate.
+
+The disc's brightness is a plane. What is behind it is continued from what is around it: the mean of the grey values
+beyond its border, weighted by their distance (normalized convolution), made anew from where the disc is in each step.
+Unknown are the centre, log R, two of stretch, and the three of the brightness. This is the model of
+`analysis.scene.lit_fit` for one who knows neither light nor size yet.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.scene.disc import MARGIN, Disc, cover
+from rig.arrays import Flags, Floats, Integers
+
+_BLUR = 0.62  # px, of lens and pixel
+_CLEAR, _REACH = 1.4, 2.2  # px beyond the border: there begins the ground; so far the fit goes
+_GROUND_BLUR = 1.2  # px
+_MODEL = 0.05  # of the contrast: standard deviation of what a ball's surface differs from one grey value
+_RADIUS_SPREAD = 0.3  # of log R about that of the blob
+_EXPLAINED = 0.95  # of the variance around the ground
+_CORRELATED = 4.0  # by how much covariances grow, since neighbouring pixels have the model's error in common
+_UNKNOWNS = 8  # centre, log R, two of stretch, and the three of the brightness
+_STRETCH_SPREAD = 0.2
+_SHADE = 0.7  # of the contrast, per radius: what a light from the side does
+_STEPS = 10
+_FARTHEST, _LARGEST = 0.7, 0.25  # of a step: px; log R
+
+
+@dataclass(slots=True, eq=False)
+class _Discs:
+    """m discs whose windows are equally large.
+
+    Attributes:
+        index: (m,) of the places.
+        x, y: (m, p) of the pixels, px of the image.
+        grey, sigma: (m, p), sigma is infinite outside of the image.
+        xy: (m, 2) centres.
+        size: (m,) log R.
+        stretch: (m, 2) as that of `analysis.scene.disc`.
+        bright: (m, 3) their grey value at the centre, and what it gains to the right and down, per radius.
+    """
+
+    index: Integers
+    x: Floats
+    y: Floats
+    grey: Floats
+    sigma: Floats
+    xy: Floats
+    size: Floats
+    stretch: Floats
+    bright: Floats
+
+
+def fit_shaded_discs(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> list[Disc | None]:
+    """Fit a disc near each of some places.
+
+    Args:
+        grey: (rows, columns) image.
+        sigma: (rows, columns) standard deviations of its grey values.
+        xy: (n, 2) approximate centres, px.
+        radius: (n,) approximate radii, px.
+
+    Returns:
+        n discs; None where a disc explains little of what differs from the ground.
+    """
+    found: list[Disc | None] = [None] * len(xy)
+    for discs in _groups(grey, sigma, xy, radius):
+        for i, disc in zip(discs.index.tolist(), _fitted(discs), strict=True):
+            found[i] = disc
+    return found
+
+
+def _groups(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> Iterator[_Discs]:
+    half = np.ceil(radius * (1 + _RADIUS_SPREAD) + MARGIN).astype(int)
+    rows, columns = grey.shape
+    for own in np.unique(half).tolist():
+        index = np.flatnonzero(half == own)
+        steps = np.arange(-own, own + 1)
+        centre = np.rint(xy[index]).astype(int)
+        x = np.broadcast_to((centre[:, :1] + steps)[:, None], (len(index), len(steps), len(steps)))
+        y = np.broadcast_to((centre[:, 1:] + steps)[:, :, None], x.shape)
+        inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+        at = np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)
+        flat = (len(index), -1)
+        window = grey[at].reshape(flat)
+        noise = np.where(inside, sigma[at], np.inf).reshape(flat)
+        size, places = np.log(radius[index]), xy[index].astype(float)
+        yield _Discs(
+            index,
+            x.reshape(flat).astype(float),
+            y.reshape(flat).astype(float),
+            window,
+            noise,
+            places,
+            size,
+            np.zeros((len(index), 2)),
+            np.zeros((len(index), 3)),
+        )
+
+
+def _fitted(discs: _Discs) -> list[Disc | None]:
+    """Least squares with priors of log R and of the shades."""
+    start, first = discs.size.copy(), discs.xy.copy()
+    discs.bright = np.zeros((len(first), 3))
+    discs.bright[:, 0] = _of_disc(discs.grey, _model(discs)[1])
+    for _ in range(_STEPS):
+        normal, right, _, _, _ = _equations(discs, start)
+        step = np.linalg.solve(normal + 1e-9 * np.eye(_UNKNOWNS), right[..., None])[..., 0]
+        discs.xy = discs.xy + np.clip(step[:, :2], -_FARTHEST, _FARTHEST)
+        discs.size = np.clip(discs.size + np.clip(step[:, 2], -_LARGEST, _LARGEST), -1.0, 3.0)
+        discs.stretch = np.clip(discs.stretch + np.clip(step[:, 3:5], -_LARGEST, _LARGEST), -0.6, 0.6)
+        discs.bright = discs.bright + step[:, 5:]
+    return _judged(discs, start, np.hypot(*(discs.xy - first).T))
+
+
+def _judged(discs: _Discs, start: Floats, moved: Floats) -> list[Disc | None]:
+    """Those that explain what differs from the ground and lie near their start, from which they moved by (m,) px."""
+    normal, _, v, contrast, weight = _equations(discs, start)
+    used, ground, radius = weight > 0, _model(discs)[0], np.exp(discs.size)
+    squares, behind = ((weight * off**2).sum(axis=1) for off in (v, discs.grey - ground))
+    more = np.maximum(used.sum(axis=1) - _UNKNOWNS, 1)
+    factor = np.sqrt((np.where(used, v / discs.sigma, 0.0) ** 2).sum(axis=1) / more)
+    rms = np.sqrt((used * v**2).sum(axis=1) / np.maximum(used.sum(axis=1), 1))
+    grown = _CORRELATED * np.maximum(1.0, squares / more)
+    covariance = np.asarray(np.linalg.inv(normal)[:, :2, :2] * grown[:, None, None], float)
+    good = (squares < (1 - _EXPLAINED) * behind) & (moved < np.maximum(1.2, radius))
+    stretch = 2 * np.arctanh(np.minimum(0.99, np.hypot(*discs.stretch.T)))
+    shapes = zip(radius.tolist(), stretch.tolist(), contrast.tolist(), rms.tolist(), factor.tolist(), strict=True)
+    return [
+        Disc(discs.xy[i].copy(), covariance[i], size, _BLUR, longer, above, off, ratio) if good[i] else None
+        for i, (size, longer, above, off, ratio) in enumerate(shapes)
+    ]
+
+
+def _model(discs: _Discs) -> tuple[Floats, Floats, tuple[Floats, ...], Flags]:
+    """The ground (m, p), the discs (m, p), their derivatives by x, y, log R and stretch, and the fitted pixels."""
+    dx, dy = discs.x - discs.xy[:, :1], discs.y - discs.xy[:, 1:]
+    p, q = discs.stretch[:, :1], discs.stretch[:, 1:]
+    u, w = (1 + p) * dx + q * dy, q * dx + (1 - p) * dy
+    r, radius = np.hypot(u, w) + 1e-9, np.exp(discs.size)
+    beyond = r - radius[:, None]
+    inside = np.isfinite(discs.sigma)
+    around = inside & (beyond > _CLEAR) & (beyond < MARGIN)
+    side = int(np.sqrt(discs.x.shape[1]))
+    pixel = np.arange(side)
+    near = np.exp(-0.5 * ((pixel[:, None] - pixel) / _GROUND_BLUR) ** 2)
+
+    def spread(values: Floats) -> Floats:
+        return np.asarray((near @ values.reshape(-1, side, side) @ near).reshape(values.shape))
+
+    ground = spread(np.where(around, discs.grey, 0.0)) / np.maximum(spread(np.where(around, 1.0, 0.0)), 1e-300)
+    disc, by_r, by_radius = cover(r, radius, np.full(len(radius), _BLUR))
+    along_u, along_w = by_r / r * u, by_r / r * w
+    derivatives = (
+        -(along_u * (1 + p) + along_w * q),
+        -(along_u * q + along_w * (1 - p)),
+        by_radius * radius[:, None],
+        along_u * dx - along_w * dy,
+        along_u * dy + along_w * dx,
+    )
+    return ground, disc, derivatives, inside & (beyond < _REACH)
+
+
+def _of_disc(values: Floats, disc: Floats) -> Floats:
+    """Means (m,) of values (m, p) under the discs."""
+    return np.asarray((values * disc).sum(axis=1) / np.maximum(disc.sum(axis=1), 1e-9))
+
+
+def _equations(discs: _Discs, start: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Normal matrices (m, 8, 8), right-hand sides (m, 8), residuals (m, p), contrasts (m,) and weights (m, p)."""
+    ground, disc, derivatives, used = _model(discs)
+    radius = np.exp(discs.size)[:, None]
+    right, down = (discs.x - discs.xy[:, :1]) / radius, (discs.y - discs.xy[:, 1:]) / radius
+    above = discs.bright[:, :1] + discs.bright[:, 1:2] * right + discs.bright[:, 2:] * down - ground
+    contrast = discs.bright[:, 0] - _of_disc(ground, disc)
+    v = discs.grey - ground - above * disc
+    weight = used / (discs.sigma**2 + (_MODEL * contrast[:, None]) ** 2)
+    design = np.stack((*(above * part for part in derivatives), disc, disc * right, disc * down), axis=1)
+    weighted = design * weight[:, None]
+    normal = weighted @ design.swapaxes(1, 2)
+    gradient = (weighted @ v[..., None])[..., 0]
+    prior = np.zeros((len(start), _UNKNOWNS))
+    prior[:, 2], prior[:, 3:5] = _RADIUS_SPREAD**-2, _STRETCH_SPREAD**-2
+    prior[:, 6:] = 1 / (_SHADE * np.maximum(np.abs(contrast), 1.0)[:, None]) ** 2
+    off = np.zeros_like(prior)
+    off[:, 2], off[:, 3:5], off[:, 6:] = start - discs.size, -discs.stretch, -discs.bright[:, 1:]
+    return normal + prior[:, :, None] * np.eye(_UNKNOWNS), gradient + prior * off, v, contrast, weight

@@ -13,6 +13,7 @@ from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, MeasuringStep
 from rig.api.statement import Level, Statement
 from rig.background.child import run_child
+from rig.errors import StorageError
 from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.host.files import make_folder
@@ -97,6 +98,8 @@ class AfterSteps:
                 if end["no_video"] is None:
                     keep_file(video, log, VIDEO)
                 self._note(recording, log, AfterStep.VIDEO, end["no_video"])
+        except StorageError as error:
+            self._fail(recording, log, error.said)
         except (OSError, ValueError) as error:
             self._fail(recording, log, plain(f"{log.name}: {error}"))
         finally:
@@ -129,7 +132,7 @@ class AfterSteps:
                 self._warn(_not_renamed(recording, from_plain(end["problem"])))
                 return False
             keep_renamed(made, log, names)
-        except (OSError, ValueError) as error:
+        except (StorageError, OSError, ValueError) as error:
             self._warn(_not_renamed(recording, plain(str(error))))
             return False
         finally:

@@ -4,7 +4,7 @@ import json
 import os
 import shutil
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import write_session_changes
 from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringState
-from rig.errors import StateForbidsError
+from rig.errors import StateForbidsError, StorageError
 from rig.events import Event
 from rig.settings.model import AnalysisSettings
 from service.measuring.queue import Measurings
@@ -53,6 +53,7 @@ class Bench:
         further: what else stands under `[analysis]`.
         found: recordings whose jumps were told.
         said: the events.
+        earlier: gives the results of the same athlete's other logs.
     """
 
     def __init__(self, folder: Path, survey: Path | None) -> None:
@@ -60,15 +61,15 @@ class Bench:
         self.further: dict[str, Any] = {}
         self.found: list[str] = []
         self.said: list[str] = []
+        self.earlier: Callable[[str], list[Path]] = MeasuredJumps(Catalogue(folder)).others_of_athlete
 
     @contextmanager
     def running(self) -> Iterator[Measurings]:
         """A service that measures."""
         analysis = self.survey and AnalysisSettings(survey=self.survey, **self.further)
         rig = SIM.model_copy(update={"analysis": analysis})
-        earlier = MeasuredJumps(Catalogue(self.folder)).others_of_athlete
         with Measurings(
-            self.folder, lambda: rig, lambda: self.busy, earlier, self._hear, self._know, lambda: None
+            self.folder, lambda: rig, lambda: self.busy, self.earlier, self._hear, self._know, lambda: None
         ) as queue:
             yield queue
 
@@ -326,3 +327,19 @@ def test_nothing_is_done_by_itself_where_nobody_wants_it(bench: Bench) -> None:
 def test_steps_that_cannot_be_are_refused_with_what_to_write(wrong: dict[str, Any], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         AnalysisSettings(survey=Path("s.json"), **wrong)
+
+
+def test_a_folder_that_cannot_be_read_fails_the_log_and_the_queue_goes_on(bench: Bench) -> None:
+    def refused(recording: str) -> list[Path]:
+        raise StorageError(f"{bench.folder}: cannot be read (Input/output error); check the folder's permissions")
+
+    bench.earlier = refused
+    shutil.copy(bench.log("jump"), bench.log("another"))
+    with bench.running() as queue:
+        for recording in ("jump", "another"):
+            queue.want(recording, bench.log(recording))
+        for recording in ("jump", "another"):
+            over = bench.until_over(queue, recording)
+            assert over.state is MeasuringState.FAILED
+            assert over.problem is not None
+            assert "cannot be read (Input/output error)" in over.problem.text

@@ -10,10 +10,8 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import pytest
 
@@ -37,7 +35,7 @@ NOT_RUN: Final = {
     r"svev cameras ": "needs a camera on a network port: tests/svev/test_cameras.py",
     r"svev doctor --bus firewire": "needs a FireWire card",
     r"svev demo --bus firewire": "tests/svev/test_demo.py runs it",
-    r"svev worker |svev ctl log": "goes on until it is stopped: tests/service, analysis",
+    r"svev worker ": "goes on until it is stopped: tests/analysis/test_analyze.py",
     r"svev analyze old\.mcap": "needs a survey of cameras of those names: tests/recorder/importing",
     r"dask |svev season run .* --scheduler": "needs a cluster that goes on: tests/season",
     r"svev season compare ": "needs thirty good jumps: tests/season/test_mixed_effects.py",
@@ -46,6 +44,7 @@ NOT_RUN: Final = {
 GOES_ON: Final = {
     r"svev serve ": "svev: panel at ",
     r"svev digitize ": "svev: measure at ",
+    r"svev ctl log": "recording",
 }
 #: Commands that record at 30 Hz: on a busy computer frames are missing, and exit code 3 says so.
 _KEEPS_TIME: Final = re.compile(r"svev (doctor|rehearse|record|verify trial/|analyze trial/)")
@@ -132,37 +131,27 @@ def _run(folder: Path, command: str, **environment: str) -> subprocess.Completed
     )
 
 
-def _run_until_ready(folder: Path, command: str, ready: str, beside: str = "", **environment: str) -> None:
+def _run_until_ready(folder: Path, command: str, ready: str, **environment: str) -> None:
     """Run a command of a page that goes on, and stop it, as with Ctrl-C, when it has said that it is ready.
 
     Args:
         folder: of the reader.
         command: of the page.
         ready: what it says then.
-        beside: another command, that runs meanwhile.
         environment: more of it.
     """
     said = folder / "said.txt"
     place = {**_environment(folder), **environment}
-    with ExitStack() as stack:
-        output = stack.enter_context(said.open("w"))
-        asked = ["/bin/bash", "-c", f"exec {command}"]
-        process = stack.enter_context(_ended(asked, cwd=folder, env=place, stdout=output, stderr=output))
-        if beside:
-            other = ["/bin/bash", "-c", f"exec {beside}"]
-            stack.enter_context(_ended(other, cwd=folder, env=place, stdout=subprocess.DEVNULL))
-        wait_until(lambda: ready in said.read_text() or process.poll() is not None, f"{command}: {ready}", 120, 0.1)
-        assert process.poll() is None, said.read_text()
-        process.send_signal(signal.SIGINT)
-        assert process.wait(60) in {0, 130}, said.read_text()
-
-
-@contextmanager
-def _ended(command: list[str], **options: Any) -> Iterator["subprocess.Popen[bytes]"]:
-    """A process that does not outlive this."""
-    with subprocess.Popen(command, **options) as process:
+    asked = ["/bin/bash", "-c", f"exec {command}"]
+    with (
+        said.open("w") as output,
+        subprocess.Popen(asked, cwd=folder, env=place, stdout=output, stderr=output) as process,
+    ):
         try:
-            yield process
+            wait_until(lambda: ready in said.read_text() or process.poll() is not None, f"{command}: {ready}", 120, 0.1)
+            assert process.poll() is None, said.read_text()
+            process.send_signal(signal.SIGINT)
+            assert process.wait(60) in {0, 130}, said.read_text()
         finally:
             if process.poll() is None:
                 process.kill()
@@ -197,8 +186,7 @@ def test_the_commands_of_a_page_run(page: Path, place: Path, recorded: Path, loo
         if _why_not(command) is not None or _asks_the_service(command):
             continue
         if (ready := _goes_on(command)) is not None:
-            its, beside = _at_own_addresses(command, loopback)
-            _run_until_ready(place, its, ready, beside)
+            _run_until_ready(place, _at_own_address(command, loopback), ready)
             continue
         if "poses.json" in command and "-o poses.json" not in command and not (place / "poses.json").exists():
             shutil.copy(recorded / "poses.json", place)  # of another page
@@ -207,17 +195,11 @@ def test_the_commands_of_a_page_run(page: Path, place: Path, recorded: Path, loo
         assert done.returncode in allowed, f"{command}\n{done.stdout}\n{done.stderr}"
 
 
-def _at_own_addresses(command: str, loopback: Loopback) -> tuple[str, str]:
-    """A command that goes on, at addresses where no test beside this one is, and the command that runs beside it."""
-    if command.startswith("svev serve "):
-        at = f"--host {loopback.host} --port {loopback.free_port()}"
-        return f"{re.sub(r'--host [0-9.]+', '', command)} {at}", ""
-    if command.startswith("svev worker "):
-        address = loopback.endpoint()
-        its = command.replace("tcp://127.0.0.1:5556", address)
-        assert its != command
-        return f"{its} --bind {loopback.endpoint()}", f"svev replay jump.mcap --bind {address} --wait 60"
-    return command, ""
+def _at_own_address(command: str, loopback: Loopback) -> str:
+    """A command that goes on, at an address where no test beside this one is."""
+    if not command.startswith("svev serve "):
+        return command
+    return f"{re.sub(r'--host [0-9.]+', '', command)} --host {loopback.host} --port {loopback.free_port()}"
 
 
 @pytest.mark.long

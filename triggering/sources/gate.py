@@ -4,7 +4,7 @@ import threading
 
 
 class Gate:
-    """One thread sets it, another one, which makes the pulses, asks it.
+    """One thread sets the gate; another thread, which makes the pulses, asks it.
 
     Args:
         still: none pass at first; else all do.

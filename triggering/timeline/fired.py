@@ -1,12 +1,12 @@
-"""What the source of the pulses says it has fired, beside what the cameras saw of it.
+"""Compares the pulses that the source reports with the pulses that the cameras saw.
 
-The source is a further witness. A pulse of which no camera has a frame is in the log all the same if the source fired
-it, and each decided pulse is compared with the source's word. Its word comes some time after a pulse, so a pulse
-behind a gap waits for it; in an unbroken train nothing waits.
+A pulse of which no camera has a frame is in the log all the same if the source reports it, and each decided pulse is
+compared with the reports. A report comes some time after its pulse, so a pulse behind a gap waits for it; in an
+unbroken train nothing waits.
 
-Source and cameras do not time the same thing: exposure may begin later than the edge of the pulse. That offset is
-learned from the pulses that both tell of. Two pulses are the same if no other pulse of the source is nearer. Nothing is
-said of times for which the source has not told its pulses, or has told them too inexactly.
+Source and cameras time different events: exposure may begin later than the edge of the pulse. This offset is learned
+from the pulses that both have. Two pulses are the same if no other pulse of the source is nearer. Times for which there
+is no report, or no exact one, are not judged.
 """
 
 from collections import deque
@@ -15,14 +15,14 @@ from typing import Final
 from rig.clocks import NS_PER_S, HostNs
 from triggering.timeline.pulse_train import PulseTrain
 
-#: A source that has said nothing for so long is not waited for.
+#: Reports of a source that has been silent for so long are not waited for.
 _SILENT_NS: Final = NS_PER_S
-#: Decided pulses that wait for the source's word; older ones are forgotten.
+#: Decided pulses that wait for a report; older ones are forgotten.
 _WAITING: Final = 1024
 #: The offset is the median of so many differences, the last ones: the first may be far off, since a camera's clock is
-#: hardly known then, or a busy computer read one late; such a one must not shift the pulses that no camera saw.
+#: hardly known then, or a busy computer read one late; such a difference must not shift the pulses that no camera saw.
 _DIFFERENCES: Final = 21
-#: Half of the distance at which two pulses are the same is left to the source's clock, the rest to the cameras'.
+#: Share of the distance at which two pulses are the same that the error of the source's clock may take.
 _SHARE: Final = 0.5
 #: Between pulses further apart than so many periods there is room for another.
 _GAP_PERIODS: Final = 1.5
@@ -35,11 +35,11 @@ class FiredPulses:
         train: the rhythm of the decided pulses.
 
     Attributes:
-        told: pulses that the source says it has fired.
-        unseen: of them, no camera delivered a frame, and one that was there took none.
-        untagged: of them, the log has none: the source's word came too late.
+        told: pulses that the source has reported.
+        unseen: how many of them no camera delivered a frame of, and a camera that was there missed.
+        untagged: how many of them the log lacks: the report came too late.
         unfired: decided pulses that the source did not fire.
-        unseen_at, unfired_at: times of the last of these; an untagged one counts as unseen.
+        unseen_at, unfired_at: times of the last unseen and unfired pulse; an untagged pulse counts as unseen.
         uncertainty_ns: largest error of the last pulse's time.
     """
 
@@ -50,11 +50,11 @@ class FiredPulses:
         self._number: int | None = None
         self._last: HostNs | None = None
         self._until: HostNs | None = None
-        self._since = 0.0  # before this the source has left out pulses
+        self._since = 0.0  # the source has left out reports before this
         self._trusted = False
         self._first: HostNs | None = None  # of the decided pulses
         self._intervals: deque[int] = deque(maxlen=2)
-        self._before: HostNs | None = None  # the last decided pulse when the source began to tell
+        self._before: HostNs | None = None  # the last decided pulse when the reports began
         self._differences: deque[int] = deque(maxlen=_DIFFERENCES)
         self._offset_ns = 0
         self.told = self.unseen = self.untagged = self.unfired = 0
@@ -64,7 +64,7 @@ class FiredPulses:
 
     @property
     def period_ns(self) -> float | None:
-        """Time between the last two pulses by the source's clock; None: it has not told of two."""
+        """Time between the last two pulses by the source's clock; None: it has not reported two."""
         return float(self._intervals[-1]) if self._intervals else None
 
     @property
@@ -74,14 +74,14 @@ class FiredPulses:
 
     @property
     def active(self) -> bool:
-        """Whether there is a source that tells of its pulses."""
+        """Whether there is a source that reports its pulses."""
         return self._until is not None
 
     def add(self, number: int, time: HostNs, uncertainty_ns: int) -> None:
         """Enter a pulse.
 
         Args:
-            number: one more than that of the pulse before it; any other: the source has not told of some in between.
+            number: one more than that of the pulse before; otherwise some in between were not reported.
             time: when it fired.
             uncertainty_ns: largest error of the time.
         """
@@ -95,7 +95,7 @@ class FiredPulses:
         self._trusted = uncertainty_ns <= _SHARE * reach
         if not self._trusted:
             self._decided.clear()
-            self._number = None  # the cameras' pulse at this time is not one that the source left out
+            self._number = None  # the source has not left out the cameras' pulse at this time
             return
         if self._until is None:
             self._until = time
@@ -104,7 +104,7 @@ class FiredPulses:
         else:
             self._before, self._since = self._train.last, place - reach
         while self._decided and self._decided[0] < place - reach:
-            self._decided.popleft()  # the source tells nothing of that time
+            self._decided.popleft()  # there is no report for that time
         if self._decided and self._decided[0] <= place + reach:
             self._learn(self._decided.popleft() - time)
         elif self._train.last is not None and place <= self._train.last + reach:
@@ -113,21 +113,21 @@ class FiredPulses:
             self._queue.append(time)
 
     def until(self, time: HostNs) -> None:
-        """Say that all pulses up to `time` have been told."""
+        """Note that all pulses up to `time` have been reported."""
         if self._trusted:
             self._until = time
             self._forget_before(self._on_line(time) - self._reach_ns)
 
     def covers(self, time: HostNs) -> bool:
-        """Whether the source has told of all pulses up to a time: there were no others."""
+        """Whether the source has reported all pulses up to a time: there were no others."""
         return self._trusted and self._until is not None and self._on_line(self._until) >= time
 
     def tells(self, now: HostNs) -> bool:
-        """Whether the source tells of its pulses at present: what it does not tell of has not fired."""
+        """Whether the source reports its pulses at present: other pulses have not fired."""
         return self._trusted and self._until is not None and now < self._until + _SILENT_NS
 
     def waits(self, before: HostNs, now: HostNs) -> bool:
-        """Whether a pulse behind a gap is to wait, since the source has not told of all pulses before it.
+        """Whether a pulse behind a gap is to wait, since the source has not reported all pulses before it.
 
         Args:
             before: time of the pulse.
@@ -161,9 +161,9 @@ class FiredPulses:
 
         Args:
             time: of the pulse.
-            inserted: it is the one that `next_unseen` told of.
+            inserted: it is the pulse that `next_unseen` returned.
             seen: a camera delivered a frame of it.
-            missed: a camera that was there took none.
+            missed: a camera that was there took no frame.
         """
         if inserted:
             self._queue.popleft()

@@ -1,6 +1,6 @@
 """Learns the rhythm of the pulses, and how far the trigger times of the frames of one pulse lie apart.
 
-Nothing of it is believed from the rig file: its rate only serves until enough pulses have been measured.
+The rate of the rig file only serves until enough pulses have been measured.
 """
 
 from collections import deque
@@ -98,7 +98,7 @@ class PulseTrain:
         return self.last is not None and time <= self.last + self.tolerance_ns
 
     def go_on(self, time: HostNs) -> None:
-        """Enter a pulse that no camera could see; its time follows from the rhythm, so it tells nothing of it."""
+        """Enter a pulse that no camera could see; its time follows from the rhythm, which it does not change."""
         self.last, self._beat, self._delivered = time, time, 0
 
     def room(self, span_ns: int) -> int:

@@ -1,9 +1,9 @@
 """Finds out which end of the exposure a camera notes as the time of a frame.
 
-Most cameras note the beginning, some the end. The difference to the other cameras is learned where it is short. One
-longer than the pairing allows for would make frames of neighbouring pulses look as if they were of one. But then the
-frames tell: none is in memory before its exposure has ended, so one that is cannot have noted its beginning. The first
-frames are not used, since what came late tells nothing.
+Most cameras note the beginning, some the end. The difference to the other cameras is learned where it is short. A
+difference longer than the pairing allows for would make frames of neighbouring pulses look as if they were of one. But
+then arrivals decide: no frame is in memory before its exposure has ended, so a frame that seems to be has not noted the
+beginning. The first frames are not used, since a late arrival is no evidence.
 """
 
 from typing import Final
@@ -11,7 +11,7 @@ from typing import Final
 from rig.clocks import HostNs
 from triggering.timeline.pulse_train import PulseTrain
 
-#: A single odd time proves nothing; so many frames do, if the clock is then found to go as it did.
+#: A single odd time proves nothing; so many frames do, if the next reading of the clock agrees with those before.
 _FRAMES: Final = 3
 #: So many frames are looked at before any is used.
 _FIRST: Final = 7
@@ -51,7 +51,7 @@ class Stamping:
         return early or self._seen <= _FIRST
 
     def confirmed(self, *, agrees: bool) -> bool:
-        """Whether it has just been found out that the camera notes the end.
+        """Whether it is clear from now on that the camera notes the end.
 
         Args:
             agrees: whether a reading of the clock has just confirmed the times of the frames before it.

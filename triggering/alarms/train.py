@@ -148,7 +148,7 @@ def spread(health: Health, names: Sequence[str]) -> Alarm | None:
         return None
     share = round(100 * pairing.spread_usual_us / pairing.period_us)
     offsets = [abs(camera.clock_offset_us or 0.0) for camera in health.cameras]
-    # Of two cameras none can be told to be the one that is off.
+    # Of two cameras either may be off.
     camera = names[offsets.index(max(offsets))] if len(names) > 2 else ", ".join(names)
     text = (
         "the frames of one pulse lie {spread_ms} ms apart, {share} % of the period, {camera} farthest off: check its "

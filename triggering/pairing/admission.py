@@ -39,7 +39,7 @@ class Admission:
         return track.judge_new(record, time, self._others[camera]) is Verdict.ACCEPTED
 
     def settle(self, now: HostNs) -> Iterator[tuple[int, FrameRecord]]:
-        """Accept or refuse the frames that wait, as far as can be told at host time `now`: cameras and frames."""
+        """Accept or refuse the frames that wait, as far as the evidence goes at host time `now`: cameras and frames."""
         for camera in range(len(self._tracks)):
             for record in self._settle(camera):
                 yield camera, record

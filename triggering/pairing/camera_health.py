@@ -52,7 +52,7 @@ def source_health(fired: FiredPulses, last: HostNs | None) -> SourcePairing | No
     if not fired.active:
         return None
     return SourcePairing(
-        fired=fired.told,
+        fired=fired.reported,
         unseen=fired.unseen,
         untagged=fired.untagged,
         unfired=fired.unfired,

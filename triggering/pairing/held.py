@@ -54,12 +54,12 @@ class HeldFrames:
         return [camera for camera, end in self._ends() if now >= end]
 
     def last_end(self, pulse: OpenPulse, arrived: HostNs) -> HostNs:
-        """Until when frames that a pulse lacks may wait.
+        """Until when the frames that wait may still be accepted for a pulse that lacks them.
 
         Args:
             pulse: an open one.
-            arrived: its frames have come by then. Frames that have come later do not keep it waiting: of a camera that
-                is doubted for good there is always one that waits.
+            arrived: its frames have come by then. Frames that have come later do not keep it waiting, since a doubted
+                camera always has a frame that waits.
         """
         lacking = (
             end for camera, end in self._ends()

@@ -92,7 +92,7 @@ class ClosedPulse(msgspec.Struct, frozen=True):
         number: counted from 1 in the order of time, without gaps.
         time: time of the pulse on the common time line.
         outcomes: one per camera.
-        cargo: that of the `OpenPulse`; None if no frame came.
+        cargo: the cargo of the `OpenPulse`; None if no frame came.
         unwatched: no camera was there; the rhythm of the train tells that the pulse was due.
     """
 

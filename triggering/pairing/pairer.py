@@ -107,11 +107,11 @@ class Pairer:
         return None
 
     def holds(self, camera: int, record: FrameRecord) -> bool:
-        """Whether a frame for which `frame` has returned no pulse waits; `released` will tell what became of it."""
+        """Whether a frame for which `frame` has returned no pulse waits; `released` will return it."""
         return self._held.has(camera, record)
 
     def released(self, now: HostNs) -> list[Released]:
-        """Place or refuse the frames that wait, as far as can be told at host time `now`.
+        """Place or refuse the frames that wait, as far as the evidence goes at host time `now`.
 
         To be called before every `advance`, which may decide the pulses of these frames.
 

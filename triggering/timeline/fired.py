@@ -35,7 +35,7 @@ class FiredPulses:
         train: the rhythm of the decided pulses.
 
     Attributes:
-        told: pulses that the source has reported.
+        reported: pulses that the source has reported.
         unseen: how many of them no camera delivered a frame of, and a camera that was there missed.
         untagged: how many of them the log lacks: the report came too late.
         unfired: decided pulses that the source did not fire.
@@ -57,7 +57,7 @@ class FiredPulses:
         self._before: HostNs | None = None  # the last decided pulse when the reports began
         self._differences: deque[int] = deque(maxlen=_DIFFERENCES)
         self._offset_ns = 0
-        self.told = self.unseen = self.untagged = self.unfired = 0
+        self.reported = self.unseen = self.untagged = self.unfired = 0
         self.uncertainty_ns = 0
         self.unseen_at: HostNs | None = None
         self.unfired_at: HostNs | None = None
@@ -85,7 +85,7 @@ class FiredPulses:
             time: when it fired.
             uncertainty_ns: largest error of the time.
         """
-        self.told += 1
+        self.reported += 1
         self.uncertainty_ns = uncertainty_ns
         follows = self._number is not None and number == self._number + 1 and self._last is not None
         if follows and self._last is not None:

@@ -1,0 +1,72 @@
+"""Collects the licences of all wheels of a bundle, and says under which terms the whole stands: licences.py BUNDLE.
+
+A wheel may hold libraries of others that its own licence does not name (`*.libs/`). Some of them are under the GPL
+(x264, x265), and so is then the whole that is passed on.
+"""
+
+import re
+import sys
+import zipfile
+from email.message import Message
+from email.parser import HeaderParser
+from pathlib import Path
+
+#: Libraries under the GPL, version 2 or later, that wheels are known to hold.
+COPYLEFT = ("libx264", "libx265", "libxvidcore", "libpostproc")
+_TEXTS = re.compile(r"[^/]+\.dist-info/(licenses/.+|(LICEN[CS]E|COPYING|NOTICE|AUTHORS)[^/]*)", re.IGNORECASE)
+_LIBRARY = re.compile(r"(?:^|/)(lib[A-Za-z0-9_+]+)[^/]*\.so[^/]*$")
+#: Where Debian keeps the text.
+GPL = Path("/usr/share/common-licenses/GPL-3")
+
+_TERMS = """This archive as a whole may be passed on under the GNU General Public License, version 3 or later
+(licences/GPL-3), because it holds libraries under the GPL: {}.
+Their sources: https://www.videolan.org/developers/x264.html, https://www.videolan.org/developers/x265.html,
+https://ffmpeg.org; how they were built: https://github.com/PyAV-Org/pyav-ffmpeg.
+Whoever passes the archive on offers these sources too.
+Svev itself stays under its BSD licence, and each package under its own."""
+
+
+def main(bundle: Path) -> None:
+    """Write LICENCES.txt and the folder `licences` of a bundle."""
+    rows, copyleft = [], []
+    for path in sorted((bundle / "wheels").glob("*.whl")):
+        with zipfile.ZipFile(path) as wheel:
+            name, row = _row(wheel, bundle / "licences")
+            inside = sorted(
+                {found[1] for each in wheel.namelist() if ".libs/" in each and (found := _LIBRARY.search(each))}
+            )
+        rows.append(row + (f"\n    libraries of others inside: {', '.join(inside)}" if inside else ""))
+        copyleft += [f"{library} in {name}" for library in inside if library.startswith(COPYLEFT)]
+    if copyleft:
+        (bundle / "licences" / "GPL-3").write_bytes(GPL.read_bytes())
+        terms = _TERMS.format(", ".join(copyleft))
+    else:
+        terms = "No library under the GPL was found in it: each package stands under its own licence, Svev under BSD."
+    text = f"{terms}\n\nPackages, with their licences as they state them; the texts are in licences/.\n\n"
+    (bundle / "LICENCES.txt").write_text(text + "\n".join(rows) + "\n", encoding="utf-8")
+
+
+def _row(wheel: zipfile.ZipFile, folder: Path) -> tuple[str, str]:
+    """Name and line of a wheel; its licence texts go into a folder of its own."""
+    (about,) = (each for each in wheel.namelist() if re.fullmatch(r"[^/]+\.dist-info/METADATA", each))
+    fields = HeaderParser().parsestr(wheel.read(about).decode("utf-8"))
+    name = f"{fields['Name']} {fields['Version']}"
+    place = folder / name.replace(" ", "-")
+    place.mkdir(parents=True)
+    texts = [each for each in wheel.namelist() if _TEXTS.fullmatch(each) and not each.endswith("/")]
+    for each in texts:
+        (place / each.partition("/")[2].replace("/", "-")).write_bytes(wheel.read(each))
+    return name, f"{name}: {_stated(fields)}" + ("" if texts else " (the wheel holds no text)")
+
+
+def _stated(fields: Message) -> str:
+    """The licence that a package states: as an expression, by classifiers, or in words."""
+    if expression := fields["License-Expression"]:
+        return str(expression)
+    trove = [each.rpartition(" :: ")[2] for each in fields.get_all("Classifier", []) if each.startswith("License ::")]
+    words = (fields["License"] or "not stated").strip().splitlines()
+    return ", ".join(trove) or words[0]
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

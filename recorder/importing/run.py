@@ -24,7 +24,7 @@ from recorder.writing.log_writer import LogDescription
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.events import Event, Level
-from rig.phrase import plain
+from rig.phrase import escaped, plain
 from rig.topics import EVENTS, IMPORT_METADATA, RECORDING_METADATA
 from triggering.ledger.account import Ledger
 
@@ -74,9 +74,9 @@ class Import:
             raise BadInputError(f"{order.out}: cannot be made there; name a file in a folder that exists")
         self._order, self._cameras = order, opened(order)
         self._pixels = pixels_of(self._cameras)
-        self._triplets = FilmTriplets(self._cameras, self._pixels, order.out.stem)
+        self._triplets = FilmTriplets(self._cameras, self._pixels, escaped(order.out.stem))
         names = [camera.name for camera in self._cameras]
-        check_tag_fits(SlotLayout(self._triplets.shape, (), self._pixels), names, SESSION, order.out.stem)
+        check_tag_fits(SlotLayout(self._triplets.shape, (), self._pixels), names, SESSION, escaped(order.out.stem))
         self._findings: list[str] = []
         self._read = 0
 
@@ -185,7 +185,7 @@ class Import:
             "utc_why": f"made of films; their date is {common['date']}",
         }
         return LogDescription(
-            session={"session": SESSION, "recording": order.out.stem},
+            session={"session": SESSION, "recording": escaped(order.out.stem)},
             rig=rig,
             rig_toml=toml,
             calibration_json=None if calibration is None else calibration.json,

@@ -26,7 +26,7 @@ from recorder.writing.log_writer import LogDescription
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, LogDamagedError
 from rig.events import Event, Level
-from rig.phrase import plain
+from rig.phrase import escaped, plain
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
     EVENTS,
@@ -102,7 +102,7 @@ def merge(first: Path, second: Path, target: Path, progress: Callable[[int], Non
     except BadInputError as error:
         raise BadInputError(f"{first} and {second}: {error}") from None
     with unfinished_log(target) as unfinished, LogStream(first) as one, LogStream(second) as two:
-        merging = _Merging(parts, (one, two), alignment, target.stem)
+        merging = _Merging(parts, (one, two), alignment, escaped(target.stem))
         size = merging.write(unfinished, progress or (lambda _: None))
     alone = [int(sum(alignment.pairs[:, 1 - side] < 0)) for side in (0, 1)]
     return MergeReport((first, second), target, size, merging.ledger, alignment, (alone[0], alone[1]))

@@ -30,7 +30,7 @@ from rig.clocks import UtcNs
 from rig.errors import StorageError
 from rig.events import Event, Level
 from rig.health import WritingHealth
-from rig.phrase import phrase
+from rig.phrase import escaped, phrase
 from rig.tag import TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
@@ -313,7 +313,7 @@ class LogWriter:
         out = b""
         for name, fields in self._metadata.items():
             if self._written_metadata.get(name) != fields:
-                record = records(Metadata(name, fields))
+                record = records(Metadata(name, {key: escaped(value) for key, value in fields.items()}))
                 self._index.add_metadata(name, position + len(out), len(record))
                 self._written_metadata[name] = dict(fields)
                 out += record

@@ -17,6 +17,7 @@ from analysis.targets.views import views
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.host.disk import replace_file
+from rig.host.files import TEXT_MAX, read_whole
 from rig.images.picture import Grey, measurable
 from rig.phrase import as_plain
 from rig.settings.model import RigSettings
@@ -81,8 +82,8 @@ class Look:
         there = kept_pictures(self._folder)
         self._kept = {path: sight for path, sight in self._kept.items() if path in there}
         for path in there:
-            if path not in self._kept and (image := cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)) is not None:
-                self._kept[path] = find_targets(np.asarray(image, np.uint8), self._layout, path.name)
+            if path not in self._kept and (image := _picture(path)) is not None:
+                self._kept[path] = find_targets(image, self._layout, path.name)
 
     def _said(self, sight: Sight | None, kept: Sequence[Sight]) -> dict[str, Any]:
         """What a camera shows now, and what its kept pictures show."""
@@ -93,3 +94,16 @@ class Look:
             "cells": shown.cells.tolist(),
             "missing": [as_plain(each) for each in shown.missing],
         }
+
+
+def _picture(path: Path) -> Grey | None:
+    """A kept picture; None: it is gone, or is none.
+
+    OpenCV opens no file itself: it waits for pipes, and dies of names that are no UTF-8.
+    """
+    try:
+        data = np.frombuffer(read_whole(path, TEXT_MAX, links=False), np.uint8)
+    except OSError:
+        return None
+    image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
+    return None if image is None else np.asarray(image, np.uint8)

@@ -181,7 +181,8 @@ def _take(camera: Camera, ring: CameraRing, settings: CameraSettings, file: Path
             rows, columns = settings.region.height, settings.region.width
             pixels = ring.frame(arrival.slot).reshape(rows, columns).copy()
             ring.return_slot(arrival.slot)
-            cv2.imwrite(str(file), _stretched(pixels))
+            # OpenCV itself dies of a name that is no UTF-8
+            file.write_bytes(cv2.imencode(file.suffix, _stretched(pixels))[1].tobytes())
             return str(file)
     raise CameraError("the camera answers, but sends no picture; check cable, MTU and firewall")
 

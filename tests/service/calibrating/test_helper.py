@@ -5,14 +5,18 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
+from analysis.targets.pattern import Layout
 from rig.api.calibrating import CalibratingOrder, CalibratingState
 from rig.errors import StateForbidsError
 from rig.settings.camera import Region
 from rig.transport.preview import PreviewSlot
 from service.calibrating.folder import kept_pictures, next_number, numbers, picture_path, remove_last
 from service.calibrating.helper import CalibrationHelper
+from service.calibrating.look import Look
 from tests.support.rigs import SIM
 from tests.support.waiting import wait_until
 
@@ -47,6 +51,19 @@ def test_the_last_pulse_is_taken_back_in_all_cameras(tmp_path: Path) -> None:
     ]  # fmt: skip
     assert remove_last(tmp_path)
     assert numbers(tmp_path) == [1]
+
+
+def test_kept_pictures_may_be_anything_in_a_folder_of_any_name(tmp_path: Path) -> None:
+    """A folder that is no UTF-8, as on a stick; a pipe, a link, an empty file and none of a picture among the names."""
+    folder = tmp_path / os.fsdecode(b"sted-\xe5")
+    _keep(folder, 1, "K1", "K2")
+    picture_path(folder, "K1", 1).write_bytes(cv2.imencode(".png", np.zeros((48, 64), np.uint8))[1].tobytes())
+    os.mkfifo(picture_path(folder, "K1", 2))
+    picture_path(folder, "K1", 3).symlink_to(picture_path(folder, "K1", 1))
+    picture_path(folder, "K1", 4).touch()
+    looking = Look(SIM, Layout(), folder)
+    looking._remember()
+    assert list(looking._kept) == [picture_path(folder, "K1", 1)]
 
 
 def test_it_refuses_what_there_is_nothing_for(tmp_path: Path, slot: PreviewSlot) -> None:

@@ -99,6 +99,8 @@ def read_lines(path: Path) -> tuple[list[Line], tuple[str, ...]]:
         _check_names(file.separator, body)
     if head is None:
         _check_unnamed(file.separator, words, path)
+        if file.separator in (" ", ",") and "sx" in columns:
+            _check_even(body, columns)
         _check_ids(cells, path)
     lines = [_line(row, each, points, ending) for row, each in zip(body, cells, strict=True)]
     hidden = sum(row.comment and sum(is_number(word) for word in row.cells) >= _FEWEST_NAMED for row in file.rows)
@@ -196,6 +198,21 @@ def _check_unnamed(separator: str, words: Sequence[str], path: Path) -> None:
         )
 
 
+def _check_even(body: Sequence[Row], columns: Sequence[str]) -> None:
+    """Refuse lines without named columns of which some have more cells: an empty one is not seen, a name may be two.
+
+    Raises:
+        BadInputError: two lines have different numbers of cells, and not because one has all sigmas, the other none.
+    """
+    counts = {len(row.cells) for row in body}
+    if len(counts) > 1 and counts != {columns.index("sx"), len(columns)}:
+        row = next(row for row in body if len(row.cells) != len(body[0].cells))
+        raise BadInputError(
+            f"{row.place}: {len(row.cells)} cells, and {len(body[0].cells)} in the first line: a cell may be empty, or "
+            "a name be taken for two; separate them by semicolons, or name the columns in the first line"
+        )
+
+
 def _check_ids(cells: Sequence[Mapping[str, str]], path: Path) -> None:
     """Refuse lines without named columns that may begin with two names: whole numbers, then coordinates.
 
@@ -223,10 +240,14 @@ def _check_names(separator: str, body: Sequence[Row]) -> None:
     """Refuse names that may go on in the next cell: "Ball 1" separated by blanks, "B,1" by commas.
 
     Raises:
-        BadInputError: a name has letters alone, and the next cell digits alone.
+        BadInputError: digits alone are beside a name of letters, or beside one of digits where other cells there are no
+            whole numbers.
     """
+    after = [row.cells[1] if len(row.cells) > 1 else "" for row in body]
+    rarely = any(after) and not all(map(_is_whole, after))
     for row in body:
-        if len(row.cells) > 1 and row.cells[0].isalpha() and row.cells[1].isdecimal():
+        name, more = row.cells[0], "".join(row.cells[1:2])
+        if more.isdecimal() and (name.isalpha() or (name.isdecimal() and rarely)):
             one = separator.join(row.cells[:2])
             raise BadInputError(
                 f'{row.place}: {one!r} may be one name; separate the cells by semicolons, or write "..." around it'

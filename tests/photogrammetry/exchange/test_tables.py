@@ -87,6 +87,7 @@ def test_a_table_is_read_as_it_stands(text: str | bytes, tmp_path: Path) -> None
             "1;17;10.5;20.5;3.5\n2;18;11.5;21.5;4.5\n",
             "the second column holds whole numbers alone and may be no coordinate",
         ),
+        ("name X Y Z s\n5 6 -22.5 33.5  1\nB2 1.5 2.5 3.5 1\n", "line 2: '5 6' may be one name"),
         (
             "1;17;10;20;3\n2;18;11;21;4\n",
             "the second column holds whole numbers alone and may be no coordinate",
@@ -124,6 +125,20 @@ def test_assumed_encodings_and_hidden_lines_are_said(tmp_path: Path) -> None:
         "balls.csv: is no UTF-8, taken as Windows-1252 (Latin-1): look whether 'Hoppkant-Ø' is right",
         "balls.csv: 1 lines of numbers are comments (# or !) and left out",
     )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1 29.5 32.833 92.37 2\n2 -83.7  159.3 2\n",
+        "a,-256.4,-57.7,2638.0\n1,5,33,49.5,31\n",
+        "5 6  1962.74  -62.67  35.5\n7  336.259  293.92  130.81\n",
+    ],
+)
+def test_lines_with_other_numbers_of_cells_are_refused_where_columns_have_no_names(text: str, tmp_path: Path) -> None:
+    """An empty cell that blanks hide, or a name that holds the separator, would shift the others."""
+    with pytest.raises(BadInputError, match=r"line 2: \d cells, and \d in the first line|may be one name"):
+        import_network([_file(tmp_path, text, "balls.obc")])
 
 
 @pytest.mark.parametrize(

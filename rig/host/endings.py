@@ -21,12 +21,20 @@ Asks = Callable[[], int]
 def counted_endings(signals: tuple[signal.Signals, ...] = ENDINGS) -> Iterator[Asks]:
     """Within, signals that end a program are counted only. One that `nohup` has switched off stays so.
 
+    A terminal that is closed is one wish to end, however often it is told: by the kernel, by the shell, by both. So
+    SIGHUP counts only if nothing has come before.
+
     Yields:
-        A function that tells how many have come.
+        A function that tells how often somebody has asked.
     """
     caught: list[int] = []
+
+    def heard(number: int, _: object) -> None:
+        if number != signal.SIGHUP or not caught:
+            caught.append(number)
+
     wanted = [each for each in signals if each is not signal.SIGHUP or signal.getsignal(each) != signal.SIG_IGN]
-    before = {number: signal.signal(number, lambda n, _: caught.append(n)) for number in wanted}
+    before = {number: signal.signal(number, heard) for number in wanted}
     try:
         yield lambda: len(caught)
     finally:

@@ -200,7 +200,7 @@ def test_ctrl_c_ends_the_recording_properly(tmp_path: Path, loopback: Loopback, 
 def test_a_terminal_that_is_closed_ends_the_recording_properly(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable
 ) -> None:
-    """It sends SIGHUP to all processes of its window, and takes standard error away."""
+    """The kernel and its shell send SIGHUP to all processes of its window, and standard error is taken away."""
     rig = write_rig(tmp_path, "sim", loopback)
     command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "60", "--json"]
     process = subprocess.Popen(
@@ -213,7 +213,8 @@ def test_a_terminal_that_is_closed_ends_the_recording_properly(
         assert process.stderr.readline()
         process.stderr.close()
         wait_until(_recording(tmp_path / "logs"), "recording", 20)
-        os.killpg(process.pid, signal.SIGHUP)
+        for _ in range(2):
+            os.killpg(process.pid, signal.SIGHUP)
         result = json.loads(process.stdout.read())
     code = process.wait(60)
     assert (code, result["stopped_early"]) == (0, True)

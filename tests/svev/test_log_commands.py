@@ -37,6 +37,7 @@ from tests.recorder.logs import (
     write_pulse,
 )
 from tests.support.loopback import Loopback
+from tests.support.repeats import repeats
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +325,7 @@ def test_help_shows_an_example_and_the_exit_codes(command: str, svev: Svev) -> N
     assert "Exit codes: 0" in text
 
 
-@pytest.mark.parametrize("closed", [">&-", ">&- 2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", repeats(["<&- >&- 2>&-", ">&-", ">&- 2>&-"]))
 @pytest.mark.parametrize("command", ["verify LOG", "verify LOG --json", "info LOG --json", "schema"])
 def test_without_standard_output_the_exit_code_tells(command: str, closed: str, tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"

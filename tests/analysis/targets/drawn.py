@@ -52,7 +52,7 @@ class DrawnCamera:
             x, y = x + (wanted_x - there_x), y + (wanted_y - there_y)
         fine = [(np.arange(n * _FINE) + 0.5) / _FINE - 0.5 for n in (width, height)]
         ideal_x, ideal_y = (RectBivariateSpline(coarse_y, coarse_x, each)(fine[1], fine[0]) for each in (x, y))
-        return ideal_x, ideal_y
+        return ideal_x.astype(np.float32), ideal_y.astype(np.float32)
 
     @cached_property
     def extents(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
@@ -152,19 +152,20 @@ def _draw(
     )
     if min(len(row), len(column)) < 2:
         return
-    # direction (x, y, -c) in the camera system
-    into = [rotation.T @ axis for axis in (right, above, towards)]
+    # direction (x, y, -c) in the camera system; plain numbers keep single precision, which is exact to 10^-4 cells
+    into = [(rotation.T @ axis).tolist() for axis in (right, above, towards)]
     start = position - sheet.place
+    c, u0, v0, depth = float(camera.c), float(right @ start), float(above @ start), float(-towards @ start)
     end = int(row[-1]) + 1
     for top in range(int(row[0]), end, _STRIP):
         bottom = min(top + _STRIP, end)
         first, last = max(top - 1, int(row[0])), min(bottom + 1, end)  # the slope of a row needs its neighbours
         wide = np.s_[first:last, column[0] : column[-1] + 1]
         x, y = camera.rays[0][wide], camera.rays[1][wide]
-        scale = (towards @ (sheet.place - position)) / (into[2][0] * x + into[2][1] * y - into[2][2] * camera.c)
-        u = right @ start + scale * (into[0][0] * x + into[0][1] * y - into[0][2] * camera.c)
-        v = above @ start + scale * (into[1][0] * x + into[1][1] * y - into[1][2] * camera.c)
-        across, down = (u + half[0]) / sheet.cell, (half[1] - v) / sheet.cell
+        scale = depth / (into[2][0] * x + into[2][1] * y - into[2][2] * c)
+        u = u0 + scale * (into[0][0] * x + into[0][1] * y - into[0][2] * c)
+        v = v0 + scale * (into[1][0] * x + into[1][1] * y - into[1][2] * c)
+        across, down = (u + float(half[0])) / sheet.cell, (float(half[1]) - v) / sheet.cell
         within = (
             (down >= 0) & (down < rows) & (across >= 0) & (across < columns) & (scale > 0) & (scale < nearest[wide])
         )

@@ -21,11 +21,12 @@ from simrig.world.scenario import BRIGHTEST, Scenario
 #: Radiance of a white surface in full light, of what a picture holds: the sensor alone clips what is brighter.
 WHITE: Final = 0.4
 STILL: Final = "still"  # picture of a camera without the jumper
-_SAMPLES, _STILL_SAMPLES = 6, 4  # of a pixel of the picture: 24 and 16 of one of the image
+_SAMPLES, _STILL_SAMPLES = 12, 6  # of a pixel of the picture: 48 and 24 of one of the image
 _BOUNCES: Final = 1
 _AROUND_M: Final = 0.35  # rendered about the joints
 _ALBEDO: Final = 0.85  # of white
 _OVERCAST: Final = 0.9  # radiance of the sky without a sun
+_EXPOSED: Final = 0.85  # radiance of a white plate that faces the cameras, 1 where the sensor is full
 _ON_PLATE: Final = 40  # points whose sight decides which share of a marker is seen
 _PATCHED: Final = 0.5  # share of the scenes in which the hip has a dark patch around its marker
 _BEND_M: Final = 0.012  # of the skis, standard deviation
@@ -67,9 +68,9 @@ class Stage:
         self._jump: Jump = JumpSeries(scenario).first()
         jumping = [state for state in states.values() if state["jumper_present"]]
         path = np.array([state["origin"] for state in jumping])
-        facing = towards(list(self._cameras.values()), path.mean(axis=0))
+        self._facing = towards(list(self._cameras.values()), path.mean(axis=0))
         self._figure = Figure(
-            scenario.jumper, facing, float(self._rng.normal(0, _BEND_M)), bool(self._rng.random() < _PATCHED)
+            scenario.jumper, self._facing, float(self._rng.normal(0, _BEND_M)), bool(self._rng.random() < _PATCHED)
         )
         self.scenery = Scenery(scenario, list(self._cameras.values()), path, self._rng)
         self.told = self._description()
@@ -185,13 +186,18 @@ class Stage:
         return np.array((level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)))
 
     def _light(self) -> dict[str, Any]:
-        """Sun and sky, exposed so that a white surface in full light is hardly brighter than white."""
+        """Sun and sky, exposed as an operator would: a white plate that faces the cameras is nearly white.
+
+        Half of what it sees is sky, half is snow in the same light.
+        """
         sun, towards = self._scenario.light.sun, self._sun
-        if sun is None or towards is None:
-            return {"sun": None, "sky": WHITE * _OVERCAST / _ALBEDO}
-        scale = WHITE / _ALBEDO * min(1.0, 1.05 / (sun.direct + sun.sky))
-        irradiance = math.pi * sun.direct * scale
-        return {"sun": {"towards": towards.tolist(), "irradiance": irradiance}, "sky": sun.sky * scale}
+        direct, sky = (0.0, _OVERCAST) if sun is None else (sun.direct, sun.sky)
+        there = np.zeros(3) if towards is None else towards
+        snow = _MATERIALS["snow"][0] * (direct * max(0.0, float(there[2])) + sky)
+        plate = direct * max(0.0, float(self._facing @ there)) + (sky + snow) / 2
+        scale = WHITE * _EXPOSED / (_ALBEDO * plate)
+        shone = {"towards": there.tolist(), "irradiance": math.pi * direct * scale}
+        return {"sun": None if towards is None else shone, "sky": sky * scale}
 
     def _materials(self) -> dict[str, dict[str, float]]:
         jumper, sun = self._scenario.jumper, self._scenario.light.sun
@@ -199,7 +205,7 @@ class Stage:
         known = _MATERIALS | {
             "ball": (_ALBEDO, 0.0, 1.0, 0.0, gloss, math.radians(rough_deg)),
             "marker": (_ALBEDO * jumper.marker / BRIGHTEST, 0.05, 0.02, 0.0, 0.0, 0.9),
-            "suit": (_ALBEDO * jumper.suit / BRIGHTEST, 0.15, 0.12, 0.03, 0.0, 0.7),
+            "suit": (_ALBEDO * jumper.suit / BRIGHTEST, 0.15, 0.12, 0.015, 0.0, 0.7),
             "helmet": (_ALBEDO * jumper.patch / BRIGHTEST, 0.1, 0.3, 0.0, 0.05, 0.3),
             "patch": (_ALBEDO * jumper.patch / BRIGHTEST, 0.1, 0.1, 0.0, 0.0, 0.7),
             "ski": (_ALBEDO * jumper.skis / BRIGHTEST, 0.07, 0.1, 0.0, 0.04, 0.4),

@@ -17,7 +17,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PACKAGES: list[str] = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
 #: `gi` is Debian's python3-gi, which pip does not install; `pydantic_core` is the part of pydantic that it pins itself;
 #: `_typeshed` is there for the type checker only.
-NOT_DECLARED = {"_typeshed", "gi", "pydantic_core"}
+#: The last two are Blender's own, whose interpreter runs the module that imports them.
+NOT_DECLARED = {"_typeshed", "gi", "pydantic_core", "bpy", "mathutils"}
 
 
 @pytest.fixture(scope="module")

@@ -49,6 +49,7 @@ _POLICY: Final = (
 )
 _ASSETS: Final = {
     "/docs": ("webpanel", "docs_page/index.html", "text/html; charset=utf-8"),
+    "/docs/icon.svg": ("webpanel", "page/icon.svg", "image/svg+xml"),
     "/docs/start.js": ("webpanel", "docs_page/start.js", "text/javascript; charset=utf-8"),
     "/docs/swagger-ui.css": ("fastapi_offline", "static/swagger-ui.css", "text/css; charset=utf-8"),
     "/docs/swagger-ui-bundle.js": (

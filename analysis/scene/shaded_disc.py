@@ -24,6 +24,7 @@ _CORRELATED = 4.0  # by how much covariances grow, since neighbouring pixels hav
 _UNKNOWNS = 8  # centre, log R, two of stretch, and the three of the brightness
 _STRETCH_SPREAD = 0.2
 _SHADE = 0.7  # of the contrast, per radius: what a light from the side does
+_NEXT_TO_NOTHING = 1e-9  # weight of an unknown without prior: where an image is flat, nothing tells of it
 _STEPS = 10
 _FARTHEST, _LARGEST = 0.7, 0.25  # of a step: px; log R
 
@@ -101,13 +102,13 @@ def _groups(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> Iterator
 
 
 def _fitted(discs: _Discs) -> list[Disc | None]:
-    """Least squares with priors of log R and of the shades."""
+    """Least squares with priors of log R, stretch and shades (Gauss-Newton with bounded steps)."""
     start, first = discs.size.copy(), discs.xy.copy()
     discs.bright = np.zeros((len(first), 3))
     discs.bright[:, 0] = _of_disc(discs.grey, _model(discs)[1])
     for _ in range(_STEPS):
         normal, right, _, _, _ = _equations(discs, start)
-        step = np.linalg.solve(normal + 1e-9 * np.eye(_UNKNOWNS), right[..., None])[..., 0]
+        step = np.linalg.solve(normal, right[..., None])[..., 0]
         discs.xy = discs.xy + np.clip(step[:, :2], -_FARTHEST, _FARTHEST)
         discs.size = np.clip(discs.size + np.clip(step[:, 2], -_LARGEST, _LARGEST), -1.0, 3.0)
         discs.stretch = np.clip(discs.stretch + np.clip(step[:, 3:5], -_LARGEST, _LARGEST), -0.6, 0.6)
@@ -181,7 +182,7 @@ def _equations(discs: _Discs, start: Floats) -> tuple[Floats, Floats, Floats, Fl
     weighted = design * weight[:, None]
     normal = weighted @ design.swapaxes(1, 2)
     gradient = (weighted @ v[..., None])[..., 0]
-    prior = np.zeros((len(start), _UNKNOWNS))
+    prior = np.full((len(start), _UNKNOWNS), _NEXT_TO_NOTHING)
     prior[:, 2], prior[:, 3:5] = _RADIUS_SPREAD**-2, _STRETCH_SPREAD**-2
     prior[:, 6:] = 1 / (_SHADE * np.maximum(np.abs(contrast), 1.0)[:, None]) ** 2
     off = np.zeros_like(prior)

@@ -20,7 +20,7 @@ def prefix(tmp_path: Path) -> Path:
     units_into(prefix, '#!/bin/sh\nexport PYTHONPATH=/opt/svev\nexec /opt/svev/.venv/bin/python -m svev "$@"\n')
     for path in prefix.rglob("*"):
         if path.is_file():
-            path.write_text(path.read_text().replace(str(prefix), "/opt/prefix"))
+            path.write_bytes(path.read_bytes().replace(bytes(prefix), b"/opt/prefix"))
     rig = (CHECKOUT / "config" / "rigs" / "sim.toml").read_text()
     (prefix / "etc/svev/rig.toml").write_text(rig.replace('"../', '"/opt/svev/config/'))
     return prefix

@@ -4,6 +4,7 @@ Needs a bundle and a prefix in which it is installed, so `make wheel` runs it: S
 """
 
 import os
+import re
 import shutil
 import subprocess
 import threading
@@ -55,6 +56,14 @@ def _versions_running(service: Serving) -> set[str]:
     return {Path(interpreter).parents[1].name for interpreter in interpreters}
 
 
+def _page_files(service: Serving, page: Path) -> list[str]:
+    """Where the files of this folder are served: documents at the root, all others below their version."""
+    place = re.search(r'src="\.(/page/[0-9a-f]+)/main\.js"', service.text("/"))
+    assert place is not None
+    names = [path.relative_to(page).as_posix() for path in page.rglob("*.*") if path.is_file()]
+    return ["/", *(f"/{name}" if name.endswith(".html") else f"{place[1]}/{name}" for name in names)]
+
+
 @contextmanager
 def _asking(service: Serving, paths: list[str]) -> Iterator[dict[str, int]]:
     """Within, the page's files are asked for all the time.
@@ -88,7 +97,6 @@ def test_an_upgrade_disturbs_nothing(bundle: Path, prefix: Path, tmp_path: Path,
     first = _current(prefix)
     folder = prefix / "lib/svev/versions" / first
     (page,) = folder.glob("lib/python3*/site-packages/webpanel/page")
-    paths = ["/", *(f"/{path.relative_to(page)}" for path in page.rglob("*.*") if path.is_file())]
     start = partial(
         serving, tmp_path, write_rig(tmp_path, loopback, backend="sim"), loopback,
         command=(str(prefix / "bin" / "svev"), "serve"),
@@ -98,6 +106,7 @@ def test_an_upgrade_disturbs_nothing(bundle: Path, prefix: Path, tmp_path: Path,
         service.arm()
         recording = service.post("/api/recordings", {"athlete": "Ola", "duration_s": 900})["id"]
         service.await_pulses(10)
+        paths = _page_files(service, page)
         with _asking(service, paths) as counts:
             _damage(bundle, "numpy")
             done = _install(bundle, prefix)

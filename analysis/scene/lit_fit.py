@@ -15,12 +15,13 @@ from math import log
 
 import numpy as np
 
+from analysis.scene.ground import BLUR
 from analysis.scene.lit_sphere import LIGHT, UNKNOWNS, Light, sphere_images
 from analysis.scene.lit_windows import FULL, SightedBalls, Windows, windows
 from analysis.scene.static_image import StaticImage
 from rig.arrays import Floats, Integers
 
-_BLUR, _BLUR_SPREAD, _GAIN_SPREAD = 0.62, 0.25, 0.3  # px and logs: priors of each camera
+_BLUR_SPREAD, _GAIN_SPREAD = 0.25, 0.3  # of logs, priors of each camera
 _RADIUS_SPREAD = 0.2  # of its log, where it is not known
 _HELD = 1e-6  # spread of a log that stays
 _SMALLEST_BLUR = 0.55  # px
@@ -94,7 +95,7 @@ def fit_lit_balls(static: Sequence[StaticImage], balls: SightedBalls, radius: fl
     """
     cameras = len(static)
     common = np.zeros(LIGHT + 2 * cameras + 1)
-    common[LIGHT + cameras : LIGHT + 2 * cameras] = log(_BLUR)
+    common[LIGHT + cameras : LIGHT + 2 * cameras] = log(BLUR)
     common[-1] = log(radius)
     common[0] = 1.0
     spread = np.concatenate((_LIGHT_SPREAD, np.full(cameras, _GAIN_SPREAD), np.full(cameras, _BLUR_SPREAD), [_HELD]))

@@ -7,14 +7,12 @@ import numpy as np
 
 from analysis.scene.camera_system import PlacedCamera
 from analysis.scene.disc import MARGIN
+from analysis.scene.ground import CLEAR, REACH, ground_behind
 from analysis.scene.lit_sphere import Spheres, disc_points
 from analysis.scene.static_image import StaticImage
 from rig.arrays import Flags, Floats, Integers
 
-_REACH = 2.2  # px beyond a ball that are fitted
-_CLEAR = 1.4  # px beyond a ball from which on its surroundings are its background
 _AROUND = 2  # px beyond the window that tell the background too
-_BACKGROUND_BLUR = 1.2  # px; the background is a mean with these weights
 _SIMILAR = 1.3  # ratio of the sizes of windows that are computed together
 FULL = 255.0  #: grey value of a pixel that is full
 _STEP_M = 0.02
@@ -38,6 +36,10 @@ class SightedBalls:
 
     def __len__(self) -> int:
         return len(self.camera)
+
+    def only(self, chosen: Integers) -> "SightedBalls":
+        """Some of them."""
+        return SightedBalls(self.camera[chosen], self.xy[chosen], self.to_image[chosen], self.axes[chosen])
 
     def radius_px(self, radius: float) -> Floats:
         """(n,) radii in the image of balls of this radius in metres."""
@@ -107,7 +109,7 @@ def windows(
         blur: the smallest that is expected, px.
     """
     size = balls.radius_px(radius)
-    half = np.ceil(size + _REACH + 0.5)
+    half = np.ceil(size + REACH + 0.5)
     order = np.argsort(half, kind="stable")
     while len(order):
         together = half[order] <= max(_SIMILAR * half[order[0]], half[order[0]] + 1)
@@ -139,9 +141,7 @@ def _cut(
     off = corner[:, :, None] + span - xy[:, :, None]
     away = np.hypot(off[:, 0, None, :], off[:, 1, :, None])
     beyond = away - size[:, None, None]
-    apart = (inside & (beyond > _CLEAR) & (beyond < MARGIN)) * 1.0
-    weight = np.exp(-0.5 * ((span[:, None] - span) / _BACKGROUND_BLUR) ** 2)
-    background = (weight @ (apart * grey) @ weight) / np.maximum(weight @ apart @ weight, 1e-300)
+    background = ground_behind(grey, inside & (beyond > CLEAR) & (beyond < MARGIN))
     cut = np.s_[:, _AROUND:-_AROUND, _AROUND:-_AROUND]
     points, area, cosine = disc_points(float(size.max()), blur)
     axes = balls.axes[index]
@@ -149,5 +149,5 @@ def _cut(
     spheres = Spheres(
         (corner + _AROUND).astype(float), w - 2 * _AROUND, background[cut], balls.to_image[index], points, area, normals
     )
-    used = (inside & (beyond < _REACH))[cut]
+    used = (inside & (beyond < REACH))[cut]
     return Windows(index, spheres, grey[cut], variance[cut], used)

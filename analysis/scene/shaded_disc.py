@@ -1,7 +1,7 @@
 """Fits discs that a light shades, before a ground that no plane describes: a ball in the sun, half before its plate.
 
-The disc's brightness is a plane. What is behind it is continued from what is around it: the mean of the grey values
-beyond its border, weighted by their distance (normalized convolution), made anew from where the disc is in each step.
+The disc's brightness is a plane. The ground behind it is continued from the pixels around it (`analysis.scene.ground`),
+anew in each step from where the disc is.
 Unknown are the centre, log R, two of stretch, and the three of the brightness. This is the model of
 `analysis.scene.lit_fit` for one who knows neither light nor size yet.
 """
@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.scene.disc import MARGIN, Disc, cover
+from analysis.scene.ground import BLUR, CLEAR, REACH, ground_behind
 from rig.arrays import Flags, Floats, Integers
 
-_BLUR = 0.62  # px, of lens and pixel
-_CLEAR, _REACH = 1.4, 2.2  # px beyond the border: there begins the ground; so far the fit goes
-_GROUND_BLUR = 1.2  # px
 _MODEL = 0.05  # of the contrast: standard deviation of what a ball's surface differs from one grey value
 _RADIUS_SPREAD = 0.3  # of log R about that of the blob
 _EXPLAINED = 0.95  # of the variance around the ground
@@ -52,6 +50,26 @@ class _Discs:
     size: Floats
     stretch: Floats
     bright: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Equations:
+    """The adjustment of m discs at their present unknowns.
+
+    Attributes:
+        normal: (m, 8, 8), right: (m, 8), with priors.
+        v: (m, p) image minus model.
+        ground: (m, p) behind the discs.
+        contrast: (m,) of the discs' centres with it.
+        weight: (m, p) of the pixels.
+    """
+
+    normal: Floats
+    right: Floats
+    v: Floats
+    ground: Floats
+    contrast: Floats
+    weight: Floats
 
 
 def fit_shaded_discs(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> list[Disc | None]:
@@ -107,8 +125,8 @@ def _fitted(discs: _Discs) -> list[Disc | None]:
     discs.bright = np.zeros((len(first), 3))
     discs.bright[:, 0] = _of_disc(discs.grey, _model(discs)[1])
     for _ in range(_STEPS):
-        normal, right, _, _, _ = _equations(discs, start)
-        step = np.linalg.solve(normal, right[..., None])[..., 0]
+        equations = _equations(discs, start)
+        step = np.linalg.solve(equations.normal, equations.right[..., None])[..., 0]
         discs.xy = discs.xy + np.clip(step[:, :2], -_FARTHEST, _FARTHEST)
         discs.size = np.clip(discs.size + np.clip(step[:, 2], -_LARGEST, _LARGEST), -1.0, 3.0)
         discs.stretch = np.clip(discs.stretch + np.clip(step[:, 3:5], -_LARGEST, _LARGEST), -0.6, 0.6)
@@ -118,19 +136,20 @@ def _fitted(discs: _Discs) -> list[Disc | None]:
 
 def _judged(discs: _Discs, start: Floats, moved: Floats) -> list[Disc | None]:
     """Those that explain what differs from the ground and lie near their start, from which they moved by (m,) px."""
-    normal, _, v, contrast, weight = _equations(discs, start)
-    used, ground, radius = weight > 0, _model(discs)[0], np.exp(discs.size)
-    squares, behind = ((weight * off**2).sum(axis=1) for off in (v, discs.grey - ground))
+    last = _equations(discs, start)
+    v, weight, radius = last.v, last.weight, np.exp(discs.size)
+    used = weight > 0
+    squares, behind = ((weight * off**2).sum(axis=1) for off in (v, discs.grey - last.ground))
     more = np.maximum(used.sum(axis=1) - _UNKNOWNS, 1)
     factor = np.sqrt((np.where(used, v / discs.sigma, 0.0) ** 2).sum(axis=1) / more)
     rms = np.sqrt((used * v**2).sum(axis=1) / np.maximum(used.sum(axis=1), 1))
     grown = _CORRELATED * np.maximum(1.0, squares / more)
-    covariance = np.asarray(np.linalg.inv(normal)[:, :2, :2] * grown[:, None, None], float)
+    covariance = np.asarray(np.linalg.inv(last.normal)[:, :2, :2] * grown[:, None, None], float)
     good = (squares < (1 - _EXPLAINED) * behind) & (moved < np.maximum(1.2, radius))
     stretch = 2 * np.arctanh(np.minimum(0.99, np.hypot(*discs.stretch.T)))
-    shapes = zip(radius.tolist(), stretch.tolist(), contrast.tolist(), rms.tolist(), factor.tolist(), strict=True)
+    shapes = zip(radius.tolist(), stretch.tolist(), last.contrast.tolist(), rms.tolist(), factor.tolist(), strict=True)
     return [
-        Disc(discs.xy[i].copy(), covariance[i], size, _BLUR, longer, above, off, ratio) if good[i] else None
+        Disc(discs.xy[i].copy(), covariance[i], size, BLUR, longer, above, off, ratio) if good[i] else None
         for i, (size, longer, above, off, ratio) in enumerate(shapes)
     ]
 
@@ -143,16 +162,11 @@ def _model(discs: _Discs) -> tuple[Floats, Floats, tuple[Floats, ...], Flags]:
     r, radius = np.hypot(u, w) + 1e-9, np.exp(discs.size)
     beyond = r - radius[:, None]
     inside = np.isfinite(discs.sigma)
-    around = inside & (beyond > _CLEAR) & (beyond < MARGIN)
+    around = inside & (beyond > CLEAR) & (beyond < MARGIN)
     side = int(np.sqrt(discs.x.shape[1]))
-    pixel = np.arange(side)
-    near = np.exp(-0.5 * ((pixel[:, None] - pixel) / _GROUND_BLUR) ** 2)
-
-    def spread(values: Floats) -> Floats:
-        return np.asarray((near @ values.reshape(-1, side, side) @ near).reshape(values.shape))
-
-    ground = spread(np.where(around, discs.grey, 0.0)) / np.maximum(spread(np.where(around, 1.0, 0.0)), 1e-300)
-    disc, by_r, by_radius = cover(r, radius, np.full(len(radius), _BLUR))
+    square = (len(r), side, side)
+    ground = ground_behind(discs.grey.reshape(square), around.reshape(square)).reshape(r.shape)
+    disc, by_r, by_radius = cover(r, radius, np.full(len(radius), BLUR))
     along_u, along_w = by_r / r * u, by_r / r * w
     derivatives = (
         -(along_u * (1 + p) + along_w * q),
@@ -161,7 +175,7 @@ def _model(discs: _Discs) -> tuple[Floats, Floats, tuple[Floats, ...], Flags]:
         along_u * dx - along_w * dy,
         along_u * dy + along_w * dx,
     )
-    return ground, disc, derivatives, inside & (beyond < _REACH)
+    return ground, disc, derivatives, inside & (beyond < REACH)
 
 
 def _of_disc(values: Floats, disc: Floats) -> Floats:
@@ -169,8 +183,7 @@ def _of_disc(values: Floats, disc: Floats) -> Floats:
     return np.asarray((values * disc).sum(axis=1) / np.maximum(disc.sum(axis=1), 1e-9))
 
 
-def _equations(discs: _Discs, start: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Normal matrices (m, 8, 8), right-hand sides (m, 8), residuals (m, p), contrasts (m,) and weights (m, p)."""
+def _equations(discs: _Discs, start: Floats) -> _Equations:
     ground, disc, derivatives, used = _model(discs)
     radius = np.exp(discs.size)[:, None]
     right, down = (discs.x - discs.xy[:, :1]) / radius, (discs.y - discs.xy[:, 1:]) / radius
@@ -187,4 +200,6 @@ def _equations(discs: _Discs, start: Floats) -> tuple[Floats, Floats, Floats, Fl
     prior[:, 6:] = 1 / (_SHADE * np.maximum(np.abs(contrast), 1.0)[:, None]) ** 2
     off = np.zeros_like(prior)
     off[:, 2], off[:, 3:5], off[:, 6:] = start - discs.size, -discs.stretch, -discs.bright[:, 1:]
-    return normal + prior[:, :, None] * np.eye(_UNKNOWNS), gradient + prior * off, v, contrast, weight
+    return _Equations(
+        normal + prior[:, :, None] * np.eye(_UNKNOWNS), gradient + prior * off, v, ground, contrast, weight
+    )

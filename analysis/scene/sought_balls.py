@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtri
 
 from analysis.scene.camera_system import CameraSystem, PlacedCamera, camera_system
 from analysis.scene.lit_balls import LitNetwork, is_ball
 from analysis.scene.lit_fit import fit_in_known_light
 from analysis.scene.lit_windows import sighted
+from analysis.scene.naming import GATE
 from analysis.scene.static_image import StaticImage
 from analysis.scene.survey import Survey
 from photogrammetry.network.file import pixel_to_metric
@@ -22,7 +22,6 @@ from photogrammetry.procedures.orientation import Orientation
 from rig.arrays import Floats, Integers
 from rig.phrase import Phrase, phrase
 
-_GATE = float(chdtri(2, 0.001))
 _NEAREST = 1.0  # radii: a prediction that is worse than that may lead to something else
 
 
@@ -72,14 +71,14 @@ def with_sought_balls(
     near = np.flatnonzero(inside & (worst < _NEAREST * size))
     if not len(near):
         return lit
-    sought = sought.only(near)
+    sought, balls = sought.only(near), balls.only(near)
     images = [static[one.name] for one in placed]
     light = lit.light.only(np.array([lit.cameras.index(one.name) for one in placed], np.intp))
-    found = fit_in_known_light(images, sighted(placed, sought.camera, sought.xyz, sought.xy), light)
+    found = fit_in_known_light(images, balls, light)
     off = found.xy - sought.xy
     spread = sought.covariance + found.covariance
     squares = (off * np.linalg.solve(spread, off[..., None])[..., 0]).sum(axis=1)
-    seen = np.flatnonzero(is_ball(found) & (squares < _GATE))
+    seen = np.flatnonzero(is_ball(found) & (squares < GATE))
     if not len(seen):
         return lit
     sought, xy = sought.only(seen), found.xy[seen]

@@ -9,13 +9,14 @@ import msgspec
 import numpy as np
 
 from analysis.cameras.source import read_source
-from analysis.measurements.model import POINTS, SIDES
+from analysis.measurements.model import POINTS
 from analysis.procedure.analyze import analyze
 from analysis.result.model import Jump, OrientedImage, PointState, PulseState, SkiState, Status
 from bench.analysis.hill_logs import HillLog
 from bench.analysis.judge import Judged
 from bench.corpus.draws import Scene
 from bench.corpus.scenes import render
+from bench.corpus.visible_skis import visible_skis
 from photogrammetry.jumper.stick_model import slope_and_heading
 from rig.arrays import Floats
 from rig.errors import SvevError
@@ -44,7 +45,7 @@ class Row(msgspec.Struct, frozen=True):
         well: told to be measured well.
         points, solved, wrong: points that two cameras show, how many of them are measured, how many are wrong.
         controlled, beyond: points that are told to be controlled, and those of them beyond four sigmas.
-        skis, skis_solved, skis_wrong: the same of skis.
+        skis, skis_solved, skis_wrong: the same of skis, where a person would see them in two images.
         squares: by part, phase and quantity: number and sum of the squares of errors over sigma.
         cpu_s: of the analysis.
     """
@@ -78,8 +79,7 @@ def judge(scene: Scene, folder: Path) -> Row:
     What the analysis refuses is a row with the reason; any other exception is a defect and is passed on.
     """
     log = render(scene, folder / f"{scene.half.value}-{scene.number}")
-    begin = time.process_time()
-    shown = _shown(log)
+    shown = _shown(scene, log)
     row = Row(
         scene.half.value,
         scene.number,
@@ -90,6 +90,7 @@ def judge(scene: Scene, folder: Path) -> Row:
         points=sum(len(points) for points, _ in shown.values()),
         skis=sum(len(skis) for _, skis in shown.values()),
     )
+    begin = time.process_time()
     try:
         analysis = analyze(log.path, read_source(log.survey, None))
     except SvevError as error:
@@ -118,17 +119,16 @@ def judge(scene: Scene, folder: Path) -> Row:
     )
 
 
-def _shown(log: HillLog) -> dict[int, tuple[set[str], set[str]]]:
-    """By pulse: the points that two cameras show, and the skis whose binding two cameras show."""
+def _shown(scene: Scene, log: HillLog) -> dict[int, tuple[set[str], set[str]]]:
+    """By pulse: the points that two cameras show, and the skis that a person sees in two images."""
     shown = {}
+    skis = visible_skis(scene, log)
     for number, state in log.truth.items():
         if not state.get("points"):
             continue
         seen = [label for of_camera in state["in_sight"].values() for label, inside in of_camera.items() if inside]
-        imaged = [label for spots in state["images"].values() for label, spot in spots.items() if spot is not None]
         points = {label for label in POINTS if seen.count(label) >= _CAMERAS}
-        skis = {side for side, label in zip(SIDES, ("P3", "P4"), strict=True) if imaged.count(label) >= _CAMERAS}
-        shown[number] = points, skis
+        shown[number] = points, {side for side, images in skis[number].items() if images >= _CAMERAS}
     return shown
 
 

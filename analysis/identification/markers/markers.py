@@ -11,13 +11,13 @@ import numpy as np
 from analysis.candidates.model import SecondLook, Spots
 from analysis.identification.markers.left_right import name_bindings
 from analysis.identification.markers.naming import name_points
-from analysis.identification.over_time.assignment import Assigned, assign, well_known
+from analysis.identification.over_time.assignment import DETECTED, Assigned, assign, well_known
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Part, PathFilter, Prediction, predict
 from analysis.identification.over_time.window import Window
 from analysis.identification.ski_bars import Bindings
 from analysis.identification.space.body import USUAL, implausibility
-from analysis.identification.space.space_points import SpacePoints
+from analysis.identification.space.sides import shown
 from analysis.identification.space.views import Views
 from analysis.measurements.model import POINTS
 from rig.arrays import Flags, Floats, Integers
@@ -26,13 +26,14 @@ from rig.arrays import Flags, Floats, Integers
 BINDINGS = [2, 3]
 #: P1, P2, P3 and P4 as sums of P1, P2, the midpoint of the bindings and half the way from P3 to P4.
 _MIXING = np.array([(1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, -1.0), (0.0, 0.0, 1.0, 1.0)])
-_ANYWHERE_M = 100.0
+ANYWHERE_M = 100.0
 _VELOCITY_M_S, _ACCELERATION_M_S2 = 6.0, 15.0  #: of a part of the body against the flight, standard deviations
 _LIMBS_M_S2 = 25.0  #: change of the acceleration of helmet and hip within 0.1 s
 _FEET_M_S2 = 15.0  #: of the bindings: they follow the table and then the flight
 _HALF_GAP_M = 0.22  #: from the midpoint to a binding: 0.16 m in the tracks of the table, up to 0.3 m in flight
 _GAP_SIGMA = (0.07, 1.0, 5.0)  #: of it, m, m/s, m/s^2
 _HIP = 1  #: index of P2 in `POINTS`
+_ASIDE_M = 0.18  #: from the body's middle to a binding, standard deviation beside half the gap
 _HIP_M = 0.05  #: of a point that was taken as the hip, standard deviation beside its own
 #: From the midpoint of the bindings to the hip, standard deviations: m, m/s, m/s^2 and its change within 0.1 s. Along
 #: and up it moves as legs stretch; aside the body hardly leans.
@@ -71,7 +72,7 @@ class Markers:
 
 def follow_markers(views: Views, window: Window, flight: Flight) -> Markers:
     """Find the spots of all markers in the candidates of a window."""
-    named = _trusted(name_points(views, window, flight), window.points, flight)
+    named = _trusted(views, name_points(views, window, flight), window, flight)
     xyz = np.full((len(window), len(POINTS), 3), np.nan)
     covariance = np.full((len(window), len(POINTS), 3, 3), np.nan)
     for t, i in np.argwhere(named >= 0).tolist():
@@ -125,7 +126,7 @@ def _names(window: Window, flight: Flight, assigned: Assigned) -> Integers:
 def _legs(flight: Flight) -> PathFilter:
     """How bindings and hip move, in the frame of the flight: midpoint, half way between, and from there to the hip."""
     path = np.stack((flight.place(flight.middle_s + np.zeros(1))[0], flight.motion[1])) @ flight.axes.T
-    anywhere = (_ANYWHERE_M, _VELOCITY_M_S, _ACCELERATION_M_S2)
+    anywhere = (ANYWHERE_M, _VELOCITY_M_S, _ACCELERATION_M_S2)
     gap = np.array(((0.0, _HALF_GAP_M, 0.0), (0.0, 0.0, 0.0)))
     sigma = tuple(np.array((free, aside, free)) for free, aside in zip(_HIP_FREE, _HIP_ASIDE, strict=True))
     return PathFilter(
@@ -204,7 +205,7 @@ def _looked(views: Views, window: Window, markers: Markers, look: SecondLook) ->
 def _parts(flight: Flight) -> list[Part]:
     """What the markers are made of (`_MIXING`)."""
     body = np.stack((flight.place(flight.middle_s + np.zeros(1))[0], flight.motion[1]))
-    sigma = (_ANYWHERE_M, _VELOCITY_M_S, _ACCELERATION_M_S2)
+    sigma = (ANYWHERE_M, _VELOCITY_M_S, _ACCELERATION_M_S2)
     gap = np.stack((_HALF_GAP_M * flight.axes[1], np.zeros(3)))
     return [
         Part(body, sigma, _LIMBS_M_S2),
@@ -214,23 +215,34 @@ def _parts(flight: Flight) -> list[Part]:
     ]
 
 
-def _trusted(named: Integers, points: Sequence[SpacePoints], flight: Flight) -> Integers:
+def _trusted(views: Views, named: Integers, window: Window, flight: Flight) -> Integers:
     """Names (t, 4) to begin with: of bindings those that are seen as a pair, which tell right from left themselves.
 
-    Where there are hardly any pairs, one of them may not be worn; then all are taken as the one on whose side of the
-    body they mostly are.
+    Where there are hardly any pairs, one of them may not be worn; then all are taken as the one that they are more
+    likely by where they lie beside the body and by the cameras that show them.
     """
     trusted = named.copy()
     both = (named[:, BINDINGS] >= 0).all(axis=1)
     trusted[~both, BINDINGS[0]] = trusted[~both, BINDINGS[1]] = -1
     if both.sum() >= _LEAST_PAIRS:
         return trusted
-    aside = {}
-    for t in np.flatnonzero((named[:, BINDINGS] >= 0).any(axis=1) & ~both & (named[:, :2] >= 0).any(axis=1)).tolist():
-        body = np.mean([points[t].xyz[i] for i in named[t, :2] if i >= 0], axis=0)
-        aside[t] = float((points[t].xyz[named[t, BINDINGS].max()] - body) @ flight.axes[1])
-    if aside:
-        only = BINDINGS[0] if np.median(list(aside.values())) < 0 else BINDINGS[1]
-        for t in aside:
+    body = (named[:, : _HIP + 1] >= 0).any(axis=1)
+    alone = np.flatnonzero((named[:, BINDINGS] >= 0).any(axis=1) & ~both & body).tolist()
+    if alone:
+        left = [_rather_left(views, window, flight, t, named[t]) for t in alone]
+        only = BINDINGS[1] if np.median(left) > 0 else BINDINGS[0]
+        for t in alone:
             trusted[t, only] = named[t, BINDINGS].max()
     return trusted
+
+
+def _rather_left(views: Views, window: Window, flight: Flight, t: int, named: Integers) -> float:
+    """How much likelier a lone binding of pulse t is the left one than the right one, natural logarithm."""
+    points, at = window.points[t], int(named[BINDINGS].max())
+    place, body = points.xyz[at], np.mean([points.xyz[i] for i in named[: _HIP + 1] if i >= 0], axis=0)
+    aside = float((place - body) @ flight.axes[1])
+    found = DETECTED * shown(views, place, flight.axes[1])[BINDINGS]
+    inside = np.array([bool(views.inside(k, place[None])[0]) for k in range(len(views))]) & window.delivered[t]
+    chance = np.where(points.rays[at] >= 0, found, np.where(inside, 1 - found, 1.0))
+    right, left = np.log(chance).sum(axis=1)
+    return float(2 * _HALF_GAP_M * aside / _ASIDE_M**2 + left - right)

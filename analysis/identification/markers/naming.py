@@ -14,6 +14,7 @@ from analysis.identification.over_time.assignment import DECISIVE, DETECTED
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.window import Window
 from analysis.identification.space.body import REACH_M, implausibility
+from analysis.identification.space.sides import shown
 from analysis.identification.space.space_points import Rays, SpacePoints
 from analysis.identification.space.views import Views
 from analysis.measurements.model import POINTS
@@ -52,8 +53,10 @@ def name_points(views: Views, window: Window, flight: Flight) -> Integers:
     time_s, points = window.time_s, window.points
     path, velocity = flight.place(time_s), flight.velocity(time_s)
     namings = [
-        _namings(points[t], _worths(views, window.rays[t], window.delivered[t], points[t]), path[t], flight.axes)
-        for t in range(len(window))
+        _namings(
+            points[t], _worths(views, window.rays[t], window.delivered[t], points[t], of_sides), path[t], flight.axes
+        )
+        for t, of_sides in enumerate(shown(views, path, flight.axes[1]))
     ]
     costs = [namings[0].costs]
     came = []
@@ -71,24 +74,26 @@ def name_points(views: Views, window: Window, flight: Flight) -> Integers:
     return np.array([naming.points[h] for naming, h in zip(namings, path_back[::-1], strict=True)])
 
 
-def _worths(views: Views, rays: Sequence[Rays], delivered: Flags, points: SpacePoints) -> Floats:
-    """Cost (n,) of each point being part of a body against chance."""
+def _worths(views: Views, rays: Sequence[Rays], delivered: Flags, points: SpacePoints, of_sides: Floats) -> Floats:
+    """Cost (4, n) of each point being each marker against chance; of_sides (4, m), see `shown`."""
     sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
-    rate = 2 * np.log(2 * np.pi / DETECTED * (1 + np.array([len(r.xy) for r in rays])) / sizes)
-    rate = rate + np.where(delivered, 2 * np.log(1 - DETECTED), 0.0)
+    found = DETECTED * of_sides
+    rate = 2 * np.log(2 * np.pi / found * (1 + np.array([len(r.xy) for r in rays])) / sizes)
+    rate = rate + np.where(delivered, 2 * np.log(1 - found), 0.0)
     cost = points.misfit + np.linalg.slogdet(points.covariance + _BODY_M**2 * np.eye(3))[1]
-    cost = cost - np.linalg.slogdet(points.covariance)[1]
+    cost = np.tile(cost - np.linalg.slogdet(points.covariance)[1], (len(POINTS), 1))
     for k, of_camera in enumerate(rays):
         seen = points.rays[:, k] >= 0
         spots = points.rays[seen, k]
-        cost[seen] += rate[k] + 2 * np.log(of_camera.variance[spots]) + of_camera.odd[spots]
+        cost[:, seen] += rate[:, k, None] + 2 * np.log(of_camera.variance[spots]) + of_camera.odd[spots]
     return np.asarray(cost)
 
 
 def _namings(points: SpacePoints, worths: Floats, path: Floats, axes: Floats) -> Namings:
     """The best namings of one pulse."""
-    near = np.flatnonzero((np.linalg.norm(points.xyz - path, axis=1) < REACH_M) & (worths < -DECISIVE))
-    near = near[np.argsort(worths[near])][:_MOST_POINTS]
+    best = worths.min(axis=0)
+    near = np.flatnonzero((np.linalg.norm(points.xyz - path, axis=1) < REACH_M) & (best < -DECISIVE))
+    near = near[np.argsort(best[near])][:_MOST_POINTS]
     n = len(near)
     local = points.xyz[near] @ axes.T
     apart = (local[None] - local[:, None]).reshape(-1, 3)
@@ -97,10 +102,10 @@ def _namings(points: SpacePoints, worths: Floats, path: Floats, axes: Floats) ->
     pair = np.zeros((len(POINTS), len(POINTS), n + 1, n + 1))  # the last row and column stand for no point
     for a, b in permutations(range(len(POINTS)), 2):
         pair[a, b, :n, :n] = implausibility(a, b, apart).reshape(n, n) + _FAR * shared
-    worth = np.append(worths[near], 0.0)
+    worth = np.column_stack((worths[:, near], np.zeros(len(POINTS))))
     chosen, costs = np.full((1, len(POINTS)), n), np.zeros(1)
     for name in _ORDER:
-        total = costs[:, None] + worth
+        total = costs[:, None] + worth[name]
         for other in range(len(POINTS)):
             total = total + pair[other, name][chosen[:, other]]
         best = np.argsort(total, axis=None)[:_BEAM]

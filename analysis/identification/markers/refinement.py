@@ -14,7 +14,7 @@ import numpy as np
 from analysis.candidates.markers.disc_profiles import BLUR_PX
 from analysis.candidates.markers.known_discs import DiscShape
 from analysis.candidates.model import SecondLook, Spots
-from analysis.identification.markers.markers import Markers, settled_again
+from analysis.identification.markers.markers import ANYWHERE_M, BINDINGS, Markers, settled_again
 from analysis.identification.over_time.assignment import well_known
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.window import Window
@@ -129,11 +129,13 @@ class _Seen:
     def worn(self) -> Flags:
         """Which markers (4,) are markers.
 
-        In some pictures hardly any marker is a disc that can be fitted; then nothing is told.
+        In some pictures hardly any marker is a disc that can be fitted; then nothing is told. Legs cover bindings, so
+        these are compared with each other.
         """
         share = self._discs / np.maximum(self._spots, 1.0)
         enough = self._spots >= _FEW
-        usual = float(np.median(share[enough])) if enough.any() else 0.0
+        usual = np.full(len(POINTS), np.median(share[enough]) if enough.any() else 0.0)
+        usual[BINDINGS] = np.where(enough[BINDINGS[::-1]], share[BINDINGS[::-1]], usual[BINDINGS])
         return np.asarray(~enough | (share >= _MOST * usual) | (usual < _MOST))
 
 
@@ -173,10 +175,13 @@ def _with(discs: Spots, chosen: Integers, others: Spots) -> Spots:
 
 
 def _only(markers: Markers, worn: Flags) -> Markers:
-    """The markers without the names of those (4,) that are not worn."""
+    """The markers without the names of those (4,) that are not worn; where these would be, nobody knows."""
     rays, xyz = markers.assigned.rays.copy(), markers.assigned.xyz.copy()
     rays[:, ~worn], xyz[:, ~worn] = -1, np.nan
-    return replace(markers, assigned=replace(markers.assigned, rays=rays, xyz=xyz))
+    covariance = markers.predicted.covariance.copy()
+    covariance[:, ~worn] = ANYWHERE_M**2 * np.eye(3)
+    predicted = replace(markers.predicted, covariance=covariance)
+    return Markers(replace(markers.assigned, rays=rays, xyz=xyz), predicted)
 
 
 def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sights: Sequence[Sight]) -> list[float]:

@@ -15,13 +15,14 @@ import numpy as np
 from analysis.identification.over_time.prediction import Prediction
 from analysis.identification.over_time.window import Window
 from analysis.identification.space.body import USUAL, implausibility
+from analysis.identification.space.sides import shown
 from analysis.identification.space.space_points import Rays, SpacePoints
 from analysis.identification.space.views import Views, gate
 from rig.arrays import Flags, Floats, Integers
 
 #: How much likelier than each rival, and than chance, an assignment must be: minus twice the logarithm of 1/1000.
 DECISIVE = 13.8
-DETECTED = 0.9  #: share of the markers in an image that are found as spots
+DETECTED = 0.9  #: share of the markers that an image shows which are found as spots
 #: By pair of markers, the first one before the second: (options of the first, options of the second).
 Strangeness: TypeAlias = dict[tuple[int, int], Floats]
 
@@ -90,7 +91,7 @@ def assign(
         known &= ~same[:, None]
         for new, old in zip(_parts(result), _parts(before[1]), strict=True):
             new[same] = old[same]
-    options = _options(views, window, predicted, known)
+    options = _options(views, window, predicted, known, axes[1])
     for t in np.flatnonzero(known.any(axis=1)).tolist():
         points = window.points[t]
         of_markers = [[nothing(m), *_worthy(options.get((t, i), ()))] for i in range(n)]
@@ -122,7 +123,9 @@ def nothing(m: int) -> Option:
     return Option(0.0, np.full(m, -1), -1)
 
 
-def _options(views: Views, window: Window, predicted: Prediction, known: Flags) -> dict[tuple[int, int], list[Option]]:
+def _options(
+    views: Views, window: Window, predicted: Prediction, known: Flags, left: Floats
+) -> dict[tuple[int, int], list[Option]]:
     """What may be each marker, by pulse and marker; those that are not known (t, n) have none."""
     found: dict[tuple[int, int], list[Option]] = {}
     steps = np.flatnonzero(known.any(axis=1))
@@ -131,13 +134,14 @@ def _options(views: Views, window: Window, predicted: Prediction, known: Flags) 
     rays = [[window.rays[t][k] for t in steps] for k in range(len(views))]
     counts = np.array([[len(of.xy) for of in of_camera] for of_camera in rays])
     sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
-    rate = 2 * np.log(2 * np.pi / DETECTED * (1 + counts.T) / sizes)
     xyz, covariance, known = predicted.xyz[steps], predicted.covariance[steps], known[steps]
+    found_share = DETECTED * np.stack([shown(views, xyz[:, i], left)[:, i] for i in range(xyz.shape[1])], axis=1)
+    rate = 2 * np.log(2 * np.pi / found_share * (1 + counts.T[:, None]) / sizes)
     sights = views.see_all(xyz.reshape(-1, 3))
     inside = np.stack([sight.inside.reshape(known.shape) for sight in sights], axis=2)
     expected = known[..., None] & window.delivered[steps][:, None] & inside
     # (t, n, m) cost of a ray by chance and by not being missed
-    cost = rate[:, None] - np.where(expected, -2 * np.log(1 - DETECTED), 0.0)
+    cost = rate + np.where(expected, 2 * np.log(1 - found_share), 0.0)
     points = [window.points[t] for t in steps]
     for t, i, option in _points(rays, points, xyz, covariance, known, cost):
         found.setdefault((int(steps[t]), i), []).append(option)

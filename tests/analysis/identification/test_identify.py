@@ -109,13 +109,14 @@ def test_who_is_too_slow_for_times_to_differ_shows_no_late_camera(monkeypatch: p
     assert not lateness(views, window, markers, replace(flight, motion=walking)).any()
 
 
-@pytest.mark.parametrize("missing", ["P2", "P4"])
+@pytest.mark.parametrize("missing", ["P2", "P3", "P4"])
 def test_a_marker_that_is_not_worn_is_not_found(missing: str) -> None:
     disturbed = Disturbed(10, body_spots=1, hidden=((missing, None, 0, 999),))
     made = scene([true_jump(7)], true_cameras(), np.random.default_rng(6), PULSES, disturbed)
     jumps = identify(made.candidates, true_cameras(), RATE_HZ)
     assert not _wrong_points(jumps, made)
-    assert _share(jumps, made) > 0.95
+    # In this scene no body hides P4 from cameras on his right side: alone it is an unlikely sight there.
+    assert _share(jumps, made) > (0.85 if missing == "P3" else 0.95)
 
 
 def _put_beside(made: Scene, pulses: range, rng: np.random.Generator) -> None:

@@ -1,5 +1,7 @@
 """Live on a hard day: cameras that shake, a binding hidden behind the other leg, an official and another jumper."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from analysis.worker.stream import Received
 from bench.analysis.hill_logs import HillLog, write_hill_log
 from bench.analysis.jumps import scenario_of
 from recorder.reading.triplets import triplets
+from simrig.world.conditions.effects import MissingMarker
 from tests.analysis.worker.found import Found
 
 pytestmark = pytest.mark.long
@@ -66,3 +69,21 @@ def test_the_whole_jump_is_measured_in_frames_that_are_put_right(followed: tuple
     ]
     assert len(errors) > 60
     assert np.mean(np.array(errors) < 0.02) > 0.9
+
+
+def test_bindings_keep_their_names_where_no_helmet_tells_the_middle_of_the_body(tmp_path: Path) -> None:
+    """The hip's marker is worn on one side, so a lone binding beside it may look like the other one."""
+    hard = scenario_of("hard", 7)
+    jumper = hard.jumper.model_copy(update={"missing_markers": (MissingMarker(marker="P1"),)})
+    log, found = write_hill_log(tmp_path / "hard", hard.model_copy(update={"jumper": jumper}), PULSES), Found()
+    with LiveAnalysis(log.survey, None, found) as analysis:
+        for tag, image in triplets(log.path):
+            analysis.take(Received(tag, image))
+    off = [
+        float(np.linalg.norm(np.array(point.X) - log.truth[state.pulse]["points"][label]))
+        for state in found.states
+        for label in ("P3", "P4")
+        if (point := state.points[label]) is not None
+    ]
+    assert len(off) > 30
+    assert max(off) < FAR_M

@@ -18,6 +18,8 @@ from simrig.world.scenario import load_scenario
 
 #: Scatter of a click, px.
 SCATTER_PX = 0.3
+#: For programs that take only what others leave of the processors, which beside other tests may be little for long.
+PATIENCE_S = 500.0
 #: Pulses of the log, numbered from 1, and those in which the jumper is measured.
 HILL_PULSES = range(20, 58)
 MEASURED = range(8, 28)

@@ -18,7 +18,7 @@ from bench.analysis.hill_logs import HillLog
 from photogrammetry.geometry.camera_model import INTERIOR
 from rig.api.digitizing import PlaceAction, StateAction, TapeOrder, TrackOrder, UndoAction
 from rig.errors import BadInputError, StateForbidsError
-from tests.analysis.digitizing.hill import MEASURED, adopt, clicks, opened
+from tests.analysis.digitizing.hill import MEASURED, PATIENCE_S, adopt, clicks, opened
 from tests.support.waiting import wait_until
 
 
@@ -231,6 +231,7 @@ def test_without_a_survey_images_are_measured_and_nothing_in_space(jump: HillLog
     desk.close()
 
 
+@pytest.mark.timeout(2 * PATIENCE_S)
 def test_nothing_takes_the_computer_from_a_recording(jump: HillLog) -> None:
     recording = True
     files = DeskFiles(jump.path, jump.path.with_suffix(".digitized"), jump.path.with_suffix(".measured"))
@@ -244,8 +245,9 @@ def test_nothing_takes_the_computer_from_a_recording(jump: HillLog) -> None:
     assert desk.programs.follow("Anna", TrackOrder(things=["P1"], pulse=20, direction=1, most=2)).state == "tracking"
     wait_until(lambda: desk.programs.follower.state("Anna").paused, "following stands still", 20)
     recording = False
-    wait_until(lambda: desk.opening().orientation.state == "done", "the cameras are oriented", 60)
-    told = desk.programs.follower.wait("Anna", 60)
+    desk.programs.orienting.wait(PATIENCE_S)
+    assert desk.opening().orientation.state == "done"
+    told = desk.programs.follower.wait("Anna", PATIENCE_S)
     assert told.tracked == {"P1": []}  # nothing stands out where it was marked
     assert str(told.stopped["P1"]) == "it was tracked as far as was asked"
     desk.close()

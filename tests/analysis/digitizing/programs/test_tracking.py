@@ -6,12 +6,13 @@ from analysis.digitizing.desk import Desk
 from bench.analysis.hill_logs import HillLog
 from rig.api.digitizing import TrackOrder
 from rig.errors import UnknownRecordingError
-from tests.analysis.digitizing.hill import adopt, clicks
+from tests.analysis.digitizing.hill import PATIENCE_S, adopt, clicks
 from tests.support.waiting import wait_until
 
 ORDER = TrackOrder(things=["P1", "P2"], pulse=20, direction=1, most=10)
 
 
+@pytest.mark.timeout(2 * PATIENCE_S)
 def test_following_stands_still_while_a_recording_runs_and_cancelled_keeps_nothing(jump: HillLog, desk: Desk) -> None:
     recording = True
     waiting = Desk(desk.files, lambda: None, busy=lambda: recording)
@@ -29,8 +30,8 @@ def test_following_stands_still_while_a_recording_runs_and_cancelled_keeps_nothi
     assert waiting.programs.follow("Anna", ORDER).state == "tracking"
     wait_until(lambda: follower.state("Anna").paused, "it stands still again", 20)
     recording = False
-    wait_until(lambda: follower.state("Anna").share > 0.3, "it goes on, and says how far it is", 30)
-    told = follower.wait("Anna", 60)
+    wait_until(lambda: follower.state("Anna").share > 0.3, "it goes on, and says how far it is", PATIENCE_S)
+    told = follower.wait("Anna", PATIENCE_S)
     assert told.tracked == {thing: list(range(21, 31)) for thing in ORDER.things}
     assert {why.code for why in told.stopped.values()} == {"hand_far"}
     with pytest.raises(UnknownRecordingError, match="the log has no pulse 999"):

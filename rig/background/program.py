@@ -1,15 +1,15 @@
-"""The frame of such a program: what it is asked, how it says how far it is, and how it stands still."""
+"""The frame of such a program: what it is asked, and how it says how far it is."""
 
 import json
 import os
 import sys
-import threading
 import time
 from collections.abc import Callable
 from typing import Any, Final
 
-from rig.background.child import AT_ONCE
+from rig.background.child import AT_ONCE, READY
 from rig.errors import SvevError
+from rig.host.endings import be_killed_with_parent
 from rig.phrase import as_plain, plain
 
 _NICE: Final = 19
@@ -18,12 +18,10 @@ _TELL_S: Final = 0.1
 
 
 class Teller:
-    """Says how far the work is, and holds it while it has to stand still."""
+    """Says how far the work is."""
 
     def __init__(self) -> None:
-        self._going, self._told = threading.Event(), 0.0
-        self._going.set()
-        threading.Thread(target=self._obey, daemon=True).start()
+        self._told = 0.0
 
     def __call__(self, *, last: bool = False, **news: object) -> None:
         """Say it, unless something was said a moment ago.
@@ -32,24 +30,15 @@ class Teller:
             last: of its kind; it is said in any case.
             news: what is said.
         """
-        self._going.wait()
         if last or time.monotonic() - self._told > _TELL_S:
             self._told = time.monotonic()
             _say(news)
-
-    def _obey(self) -> None:
-        for line in sys.stdin:
-            if line.strip() == "pause":
-                self._going.clear()
-            else:
-                self._going.set()
-        os._exit(1)
 
 
 def serve(work: Callable[[dict[str, Any], Teller], dict[str, Any]]) -> None:
     """Do the work that the first line of standard input asks for, and say what it has come to.
 
-    Every further line is "pause" or "go"; the end of standard input, which is also that of the service, ends it.
+    It ends with the service, also while it stands still: the kernel kills it.
 
     Args:
         work: takes what is asked and whom to tell; its libraries are to be imported within, so that their threads have
@@ -58,6 +47,8 @@ def serve(work: Callable[[dict[str, Any], Teller], dict[str, Any]]) -> None:
     if AT_ONCE not in sys.argv[1:]:
         os.nice(_NICE)
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+    be_killed_with_parent()
+    _say(READY)  # fails if the service has ended before that
     asked: dict[str, Any] = json.loads(sys.stdin.readline())
     try:
         end = work(asked, Teller())

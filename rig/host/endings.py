@@ -4,6 +4,7 @@ A signal that raises an exception may do so at any place, also where nothing cle
 processes of their own count the signals instead, and look at the count where they wait.
 """
 
+import ctypes
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,8 @@ from typing import Final
 #: Ctrl-C, `kill` and systemd, and a terminal that is closed or an `ssh` that is dropped.
 ENDINGS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _OF_THE_TERMINAL: Final = (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP)
+
+_PR_SET_PDEATHSIG: Final = 1  # <linux/prctl.h>
 
 #: Tells how often somebody has asked the program to end.
 Asks = Callable[[], int]
@@ -67,3 +70,8 @@ def heed_terminal_again() -> None:
     """Undo `leave_terminal_to_parent`."""
     for number in _OF_THE_TERMINAL:
         signal.signal(number, signal.SIG_DFL)
+
+
+def be_killed_with_parent() -> None:
+    """Let the kernel kill this process, stopped (SIGSTOP) or not, as soon as the *thread* that started it ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

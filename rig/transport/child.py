@@ -1,7 +1,6 @@
 """The first thing that every child process does: set up its control channel, its signals and its lifeline."""
 
 import atexit
-import ctypes
 import os
 import select
 import signal
@@ -14,7 +13,7 @@ from typing import Any, Final, Generic, TypeVar
 
 import msgspec
 
-from rig.host.endings import leave_terminal_to_parent
+from rig.host.endings import be_killed_with_parent, leave_terminal_to_parent
 from rig.transport.channel import ControlChannel
 from rig.transport.message import Quit
 
@@ -26,7 +25,6 @@ _LAST_REPORTS_S: Final = 5.0
 _TURN_S: Final = 0.25
 _BAD_CONFIG: Final = 2
 _THREAD_FAILED: Final = 70  # EX_SOFTWARE of <sysexits.h>
-_PR_SET_PDEATHSIG: Final = 1  # <linux/prctl.h>
 
 
 class ChildContext(Generic[Config]):
@@ -102,7 +100,7 @@ def begin(
     """
     end_with_failed_thread()
     if killed_with_parent:
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        be_killed_with_parent()
     name, fd = sys.argv[1], int(sys.argv[2])
     control: ControlChannel[Any] = ControlChannel(socket.socket(fileno=fd), config | commands)
     try:

@@ -139,7 +139,7 @@ class Launcher:
     """
 
     def __init__(self, asking: socket.socket, process: Process) -> None:
-        self._loaded_with = _read_once(_environment())
+        self._loaded_with = _read_once(program_environment())
         self._lock = threading.Lock()
         self._socket, self._process = asking, process
         self._socket.settimeout(_ANSWER_S)
@@ -153,7 +153,7 @@ class Launcher:
             descriptors = (theirs.fileno(),)
             return cls(
                 ours,
-                subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=descriptors, env=_environment()),
+                subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=descriptors, env=program_environment()),
             )
 
     @property
@@ -232,17 +232,13 @@ def program_command(module: str) -> tuple[str, ...]:
 
 
 def program_environment() -> dict[str, str]:
-    """The environment of a program of ours: the present one, and the same code as ours wherever we were started."""
-    path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
-    return {**os.environ, "PYTHONPATH": path}
+    """The environment of a program of ours: the present one, and the same code as ours wherever we were started.
 
-
-def _environment() -> dict[str, str]:
-    """The environment of a child.
-
-    Linear algebra runs on one thread: the children share the processors, and the launcher must have one thread only.
+    Linear algebra runs on one thread: our matrices are small, programs share the processors, and the launcher must have
+    one thread only.
     """
-    return {**program_environment(), "OPENBLAS_NUM_THREADS": "1"}
+    path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
 
 
 def _read_once(environment: Mapping[str, str]) -> dict[str, str]:
@@ -309,7 +305,7 @@ def start_program(
         output: descriptor of its standard output and error, or those of both; None: ours.
         launches: it will start programs itself, soon after its start.
     """
-    command, environment = (*program_command(module), *arguments), {**_environment(), **more}
+    command, environment = (*program_command(module), *arguments), {**program_environment(), **more}
     launch = Launch(module, command, inherit, own_group, launches, str(Path.cwd()), environment)
     out, err = output if isinstance(output, tuple) else (output, output)
     return launcher().launch(launch, (1 if out is None else out, 2 if err is None else err)) or subprocess.Popen(

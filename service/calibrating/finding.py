@@ -32,7 +32,6 @@ def _find(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     while True:
         slot.want(_LEASE_S)
         if slot.newest() in {0, last} or (image := slot.read()) is None or image.pixels.shape != rig.triplet_shape:
-            tell()  # stands still here while a recording runs
             time.sleep(_POLL_S)
             continue
         last = image.pulse

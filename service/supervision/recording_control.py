@@ -121,6 +121,10 @@ class RecordingControl:
         for answer in answers:
             answer()
 
+    def runs(self) -> bool:
+        """Whether a recording runs or is being opened; any thread may ask."""
+        return self.current is not None
+
     def start(self, order: RecordingOrder, opened: "Future[Recording]") -> None:
         """Have the recorder open a log for the jumper whom the order names, or for the next one.
 

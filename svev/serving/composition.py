@@ -194,33 +194,24 @@ def _door(
 
 def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:
     """The exports of the recordings, which leave the disk its reserve and stand still while a recording runs."""
-
-    def busy() -> bool:
-        return supervisor.status.recording is not None
-
-    return Exports(data, busy, lambda: usable_bytes(rig, free_bytes(data) or 0))
+    return Exports(data, supervisor.recordings.runs, lambda: usable_bytes(rig, free_bytes(data) or 0))
 
 
 def _calibrating(rig_file: Path, data: Path, supervisor: Supervisor, slot: PreviewSlot) -> CalibrationHelper:
     """Helps to calibrate the cameras with what the recorder leaves for people to look at."""
-
-    def busy() -> bool:
-        return supervisor.status.recording is not None
-
-    return CalibrationHelper(data, lambda: supervisor.rig, slot.fd, busy, CalibrationKeeper(supervisor, rig_file))
+    keep = CalibrationKeeper(supervisor, rig_file)
+    return CalibrationHelper(data, lambda: supervisor.rig, slot.fd, supervisor.recordings.runs, keep)
 
 
 def _measurings(data: Path, supervisor: Supervisor, jumps: MeasuredJumps) -> Measurings:
     """Measures the logs of the recordings, and stands still while a recording runs."""
-
-    def busy() -> bool:
-        return supervisor.status.recording is not None
 
     def found(jumps: tuple[LastJump, ...]) -> None:
         with suppress(ProcessDiedError):  # the service ends; the result is on the disk
             supervisor.commands.ask(at_once(partial(supervisor.board.know_jumps, jumps)), _SOON_S)
 
     earlier, hub = jumps.others_of_athlete, supervisor.hub
+    busy = supervisor.recordings.runs
     made = Measurings(data, lambda: supervisor.rig, busy, earlier, hub.tell, found, hub.wake)
     supervisor.recordings.on_log = made.opened
     return made
@@ -244,7 +235,7 @@ def _desks(catalogue: Catalogue, supervisor: Supervisor) -> Desks:
             return None
         return read_source(given.survey, given.calibration)
 
-    return Desks(find, source, lambda: supervisor.status.recording is not None)
+    return Desks(find, source, supervisor.recordings.runs)
 
 
 def _telling(

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from analysis.digitizing.programs.orienting import OrientedCameras, OrientingOrder
 
 
-def _orient(order: "OrientingOrder", _: Path, tell: Teller) -> "OrientedCameras":
+def _orient(order: "OrientingOrder", _: Path, __: Teller) -> "OrientedCameras":
     from analysis.cameras.frames import LogFrames  # noqa: PLC0415 - its libraries start their threads with our priority
     from analysis.digitizing.programs.clicked_balls import orient_by_clicks  # noqa: PLC0415
     from analysis.digitizing.programs.orienting import OrientedCameras  # noqa: PLC0415
@@ -20,7 +20,6 @@ def _orient(order: "OrientingOrder", _: Path, tell: Teller) -> "OrientedCameras"
     from analysis.procedure.orienting import oriented  # noqa: PLC0415
     from analysis.scene.static_image import static_images  # noqa: PLC0415
 
-    tell(last=True)  # stands still here while a recording runs
     if order.marks is None:
         try:
             found = oriented(static_images(order.log), order.source, LogFrames(order.log))

@@ -20,7 +20,7 @@ def _track(order: "TrackingOrder", _: Path, tell: Teller) -> "Followed":
     steps, done = steps_of(order.order), count()
 
     def step() -> None:
-        tell(share=min(1.0, next(done) / steps))  # stands still here while a recording runs
+        tell(share=min(1.0, next(done) / steps))
 
     pursuit = Pursuit(OpenedLog(order.log), order.system, order.marks, order.measured, order.order, step)
     return Followed(order.order, follow(pursuit))

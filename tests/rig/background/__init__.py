@@ -1,0 +1,1 @@
+"""Tests of programs that do long work beside the service."""

@@ -12,7 +12,6 @@ from analysis.report.coach import write_report
 from analysis.report.kinogram.earlier import EarlierJump
 from analysis.report.kinogram.folder import write_kinograms
 from analysis.report.protocol import write_protocol
-from analysis.report.video import write_video
 from analysis.result import file as result_file
 from analysis.result.naming import CAMERAS
 from photogrammetry.network.file_writer import write_network
@@ -82,6 +81,8 @@ def write_folder(
         raise StorageError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from error
     written += [page, overlay, *write_protocol(analysis.result, analysis.measurements, folder, analysis.orientation)]
     if video:
+        from analysis.report.video import write_video  # noqa: PLC0415 - where there is no video, nobody waits for its libraries
+
         film = folder / VIDEO
         write_video(
             analysis.result,

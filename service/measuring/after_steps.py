@@ -38,7 +38,7 @@ class AfterSteps:
         hear: takes how far the work is.
         hold: called with True when it stands still, with False when it goes on.
         tell: takes an event for the live log.
-        found: takes the main figures of the jumps of a log, when it is measured.
+        found: takes the main figures of the jumps of a log, when it is measured, before the files are there.
     """
 
     def __init__(
@@ -82,9 +82,16 @@ class AfterSteps:
                 "earlier": [str(path) for path in self._earlier(recording)],
             }
 
+            found: tuple[LastJump, ...] = ()
+
             def hear(news: dict[str, Any]) -> None:
-                if "jumps" in news:  # people wait for the figures, not for the video
-                    self._keep(recording, log, made, news["jumps"], names)
+                nonlocal found
+                if "jumps" in news:  # people wait for the figures, not for pages and pictures
+                    found = tuple(LastJump.model_validate(each | {"recording": recording}) for each in news["jumps"])
+                    self._found(found)
+                elif "whole" in news:  # nor for the video
+                    if log.exists():
+                        keep_result(made, log, found, names)
                 else:
                     self._hear(news)
 
@@ -104,13 +111,6 @@ class AfterSteps:
             self._fail(recording, log, plain(f"{log.name}: {error}"))
         finally:
             shutil.rmtree(made, ignore_errors=True)
-
-    def _keep(self, recording: str, log: Path, made: Path, found: list[dict[str, Any]], names: dict[str, str]) -> None:
-        if not log.exists():
-            return
-        jumps = tuple(LastJump.model_validate(jump).model_copy(update={"recording": recording}) for jump in found)
-        keep_result(made, log, jumps, names)
-        self._found(jumps)
 
     def rename(self, recording: str, log: Path) -> bool:
         """Write those files of a result anew that say whose jump it is; what failed is told.

@@ -13,13 +13,13 @@ from rig.phrase import as_plain
 def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     """Measure `log` by `survey` or `calibration` into the folder `out`, then draw the `video`, unless it is null.
 
-    Tells the main figures of the jumps when the folder is whole, and says at the end why there is no video; or why the
-    log cannot be measured, and whether survey or poses are the reason: they cannot be read, or do not fit its balls.
+    Tells the main figures of the jumps before it writes anything, and when the folder is whole; says at the end why
+    there is no video, or why the log cannot be measured, and whether survey or poses are the reason: they cannot be
+    read, or do not fit its balls.
     """
     from analysis.cameras.source import read_source  # noqa: PLC0415 - its libraries start their threads with our low priority
     from analysis.procedure.analyze import analyze  # noqa: PLC0415
     from analysis.procedure.result_folder import write_folder  # noqa: PLC0415
-    from analysis.report.video import write_video  # noqa: PLC0415
     from analysis.worker.findings import summary  # noqa: PLC0415
     from service.measuring.earlier import earlier_jumps  # noqa: PLC0415
 
@@ -43,13 +43,16 @@ def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     except SvevError as error:
         return _failed(error, by_source=orienting)
     result = found.result
-    write_folder(found, log, out, earlier=earlier_jumps(asked["earlier"]), progress=progress)
     jumps = [
         summary(result.recording, result.rate_hz, jump, found.perpendicular.get(jump.number)) for jump in result.jumps
     ]
     tell(last=True, jumps=[jump.model_dump(mode="json") for jump in jumps])
+    write_folder(found, log, out, earlier=earlier_jumps(asked["earlier"]), progress=progress)
+    tell(last=True, whole=True)
     if asked["video"] is None:
         return {}
+    from analysis.report.video import write_video  # noqa: PLC0415 - its libraries, when the figures are told
+
     try:
         write_video(
             result, found.measurements, found.system, log, Path(asked["video"]),

@@ -50,7 +50,7 @@ class Measurings:
         busy: whether a recording runs.
         earlier: gives the `kinogram.json` of the other measured logs of whoever jumps in a recording.
         tell: takes an event for the live log.
-        found: takes the main figures of the jumps of a log, when it is measured.
+        found: takes the main figures of the jumps of a log, when it is measured, before its files are there.
         changed: called when something has changed that people see.
     """
 
@@ -71,7 +71,9 @@ class Measurings:
         self._at = self._waiting  # what the log stands in that is at work
         self._retries = Retries(folder, in_use)
         self._running: MeasuringQueue | None = None
-        self._after = AfterSteps(folder, busy, earlier, self._wanted, self._hear, self._hold, tell, found)
+        self._figures: tuple[LastJump, ...] = ()  # of what is running
+        self._found = found
+        self._after = AfterSteps(folder, busy, earlier, self._wanted, self._hear, self._hold, tell, self._know)
         self._lock = threading.Lock()
         self._bell, self._closed = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="measuring", daemon=True)
@@ -148,6 +150,8 @@ class Measurings:
             update = {name: getattr(running, name) for name in ("state", "paused", "step", "share")}
             if running.step in _AT_WORK:  # what was measured is there
                 update["state"] = known.state
+            elif self._figures and not known.files:
+                update |= {"figures": self._figures, "live": False}
         return known.model_copy(update=update | {"steps": self._steps(known, running)})
 
     def _steps(self, known: Measurement, running: MeasuringQueue | None) -> tuple[StepState, ...]:
@@ -254,6 +258,7 @@ class Measurings:
     def _at_work(self, recording: str, waiting: WaitingLogs) -> Iterator[None]:
         with self._lock:
             self._running, self._at = MeasuringQueue(recording=recording, state=MeasuringState.MEASURING), waiting
+            self._figures = ()
         self._changed()
         try:
             yield
@@ -266,6 +271,12 @@ class Measurings:
 
     def _hold(self, held: bool) -> None:
         self._change(paused=held)
+
+    def _know(self, jumps: tuple[LastJump, ...]) -> None:
+        """Have the figures while the files are being written."""
+        self._figures = jumps
+        self._found(jumps)
+        self._changed()
 
     def _hear(self, news: dict[str, Any]) -> None:
         """Enter how far the program is; in steps that somebody would see, since everybody is told of each."""

@@ -52,6 +52,7 @@ class Bench:
         survey: what the rig file names; None: it has no `[analysis]`.
         further: what else stands under `[analysis]`.
         found: recordings whose jumps were told.
+        shown: what was known of each of them then.
         said: the events.
         earlier: gives the results of the same athlete's other logs.
     """
@@ -60,6 +61,7 @@ class Bench:
         self.folder, self.busy, self.survey = folder, False, survey
         self.further: dict[str, Any] = {}
         self.found: list[str] = []
+        self.shown: list[Measurement] = []
         self.said: list[str] = []
         self.earlier: Callable[[str], list[Path]] = MeasuredJumps(Catalogue(folder)).others_of_athlete
 
@@ -70,8 +72,8 @@ class Bench:
         rig = SIM.model_copy(update={"analysis": analysis})
         with Measurings(
             self.folder, lambda: rig, lambda: self.busy, self.earlier, self._hear, self._know, lambda: None
-        ) as queue:
-            yield queue
+        ) as self._queue:
+            yield self._queue
 
     def log(self, recording: str) -> Path:
         """The log of a recording."""
@@ -97,6 +99,7 @@ class Bench:
 
     def _know(self, jumps: tuple[LastJump, ...]) -> None:
         self.found += [jump.recording for jump in jumps]
+        self.shown += [self.of(self._queue, jump.recording) for jump in jumps]
 
 
 @pytest.fixture
@@ -118,6 +121,8 @@ def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside
     (jump,) = done.figures
     assert jump.ok, jump.verdict
     assert (jump.recording, bench.found, bench.waiting()) == ("jump", ["jump"], [])
+    (early,) = bench.shown  # the figures do not wait until pages and pictures are written
+    assert (early.state, early.figures, early.files, early.live) == (MeasuringState.MEASURING, (jump,), (), False)
     assert jump.takeoff_speed is not None
     assert abs(jump.takeoff_speed.value - 26.1) < 1.0
     assert {"report.html", "jumper.c3d", "jumper.trc", "jumper.csv", "jumper.json", "protocol.html"} <= set(done.files)

@@ -60,7 +60,7 @@ export async function loadMeasurement(shown) {
 function follow() {
   const now = known.status?.measuring;
   const before = queue;
-  if (now) queue = `${now.recording} ${now.state} ${now.paused} ${now.waiting}`;
+  if (now) queue = `${now.recording} ${now.state} ${now.paused} ${now.waiting} ${now.step === "writing"}`; // figures come before files
   if (queue !== before) void attempt(look);
   draw();
 }
@@ -147,7 +147,7 @@ function inWords({ state, before, measured: then, version, figures, live, refuse
   const why = refused && state !== "done" ? say(refused) : null;
   const unable = why ? t("measurement.refused", { why: `${why.text}: ${why.advice}.` }) : "";
   const when = { day: then ? day(then) : "", time: then ? timeOfDay(then) : "" };
-  const old = figures.length && !live ? t("measurement.earlier", when) : "";
+  const old = figures.length && !live && then ? t("measurement.earlier", when) : "";
   const sentences = {
     none: [t(live ? "measurement.live" : "measurement.none")],
     waiting: [before ? t("measurement.waiting", { before }) : t("measurement.next"), known.status?.recording ? t("measurement.while_recording") : "", old],

@@ -53,7 +53,7 @@ _NOTES: Final = (
 )
 _MORE: Final = Said(
     "How the cameras were oriented, and the test of every ray: protocol.html.",
-    "Hvordan kameraene ble orientert, og testen av hver stråle: protocol.html (på engelsk).",
+    "Hvordan kameraene ble orientert, og testen av hver stråle: protocol.html.",
 )
 #: Fields of a session that are not on the page, which is sent on and opened by the link to a jump: what was noted about
 #: the athlete, by whom, and how the recording is found again.

@@ -10,6 +10,7 @@ import numpy as np
 
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, Source
 from analysis.report.figures import fixed
+from analysis.report.protocol_norwegian import norwegian
 from analysis.result.model import (
     Jump,
     JumperState,
@@ -35,7 +36,7 @@ Part = str | Table
 def write_protocol(
     result: MeasuredRecording, measurements: Measurements, out: Path, orientation: Orientation | None = None
 ) -> tuple[Path, Path]:
-    """Write `protocol.txt` and `protocol.html` into a folder.
+    """Write `protocol.txt` and `protocol.html` into a folder; the page is in English and Norwegian.
 
     Args:
         result: what was measured.
@@ -50,7 +51,8 @@ def write_protocol(
         BadInputError: the folder cannot be written to.
     """
     try:
-        return write_report(protocol(result, measurements, orientation), out)
+        english = protocol(result, measurements, orientation)
+        return write_report(english, out, norwegian(english, result))
     except OSError as error:
         raise BadInputError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None
 

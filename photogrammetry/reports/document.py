@@ -23,6 +23,9 @@ _STYLE = f"""
 *{{box-sizing:border-box}}
 body{{font:16px/1.5 system-ui,sans-serif;background:var(--paper);color:var(--ink);max-width:74rem;margin:auto;\
 padding:1rem;overflow-wrap:break-word}}
+fieldset{{float:right;border:0;margin:0;padding:0}}
+fieldset label{{display:inline-block;margin-left:.6rem;padding:.75rem .2rem}}
+:root:has(#in-nb:checked) body [lang=en],:root:has(#in-en:checked) body [lang=nb]{{display:none}}
 h1{{font-size:1.6rem;line-height:1.2;margin:.5rem 0 1.5rem}}
 h2{{font-size:1.2rem;margin:2.2rem 0 .6rem;padding-bottom:.2rem;border-bottom:2px solid var(--faint)}}
 p{{margin:.4rem 0;max-width:62rem}}
@@ -47,8 +50,17 @@ svg line,svg polyline,svg ellipse,svg circle[fill=none]{{stroke:currentColor}}
 @page{{size:A4;margin:12mm}}
 @media print{{:root{{font-size:10pt}}body{{font-size:10pt;max-width:none;padding:0}}table{{font-size:.75rem}}\
 th,td{{padding:.1rem .25rem}}.table{{overflow:visible}}tr{{break-inside:avoid}}\
-h2{{break-after:avoid}}.drawings{{grid-template-columns:1fr 1fr}}svg{{border:1px solid var(--faint)}}}}
+h2{{break-after:avoid}}.drawings{{grid-template-columns:1fr 1fr}}svg{{border:1px solid var(--faint)}}\
+fieldset{{display:none}}}}
 """
+
+
+_CHOICE = (
+    '<fieldset aria-label="Language / Språk"><label><input type="radio" name="language" id="in-en" checked> English'
+    '</label><label><input type="radio" name="language" id="in-nb"> Norsk</label></fieldset>'
+    '<script>document.getElementById(/^(nb|nn|no)\\b/i.test(navigator.language) ? "in-nb" : "in-en").checked = true'
+    "</script>"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +133,13 @@ def _padded(row: Sequence[str], widths: Sequence[int]) -> list[str]:
     return [first, *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
 
 
-def write_report(report: Report, folder: Path) -> tuple[Path, Path]:
+def write_report(report: Report, folder: Path, norwegian: Report | None = None) -> tuple[Path, Path]:
     """Write `protocol.txt` and `protocol.html` into a folder, which is created if it does not exist.
+
+    Args:
+        report: what to write.
+        folder: where.
+        norwegian: the same, for the page; see `as_html`.
 
     Raises:
         OSError: the folder cannot be written to.
@@ -130,15 +147,22 @@ def write_report(report: Report, folder: Path) -> tuple[Path, Path]:
     folder.mkdir(parents=True, exist_ok=True)
     text, page = folder / "protocol.txt", folder / "protocol.html"
     text.write_text(as_text(report), encoding="utf-8")
-    page.write_text(as_html(report), encoding="utf-8")
+    page.write_text(as_html(report, norwegian), encoding="utf-8")
     return text, page
 
 
-def as_html(report: Report) -> str:
-    """The report as one page."""
+def as_html(report: Report, norwegian: Report | None = None) -> str:
+    """The report as one page.
+
+    Args:
+        report: what to show.
+        norwegian: the same in Norwegian, part by part; the page holds both, and shows the one that its reader chooses.
+    """
+    other = norwegian or report
     body = [
-        f"<h1>{escape(report.title)}</h1>",
-        *(line for section in report.sections for line in _section(section)),
+        *([] if norwegian is None else [_CHOICE]),
+        f"<h1>{_both(report.title, other.title)}</h1>",
+        *(line for pair in zip(report.sections, other.sections, strict=True) for line in _section(*pair)),
     ]
     head = (
         '<meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">'
@@ -147,22 +171,35 @@ def as_html(report: Report) -> str:
     return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n' + "\n".join(body) + "\n</body></html>\n"
 
 
-def _section(section: Section) -> list[str]:
+def _both(english: str, norwegian: str) -> str:
+    """A text in both languages, where they differ."""
+    if english == norwegian:
+        return escape(english)
+    return f'<span lang="en">{escape(english)}</span><span lang="nb">{escape(norwegian)}</span>'
+
+
+def _section(section: Section, other: Section) -> list[str]:
     """The lines of a section; successive drawings form a grid."""
-    lines = [f"<h2>{escape(section.title)}</h2>"]
-    for drawn, parts in groupby(section.parts, lambda part: isinstance(part, Drawing)):
+    lines = [f"<h2>{_both(section.title, other.title)}</h2>"]
+    pairs = zip(section.parts, other.parts, strict=True)
+    for drawn, parts in groupby(pairs, lambda pair: isinstance(pair[0], Drawing)):
         lines += ['<div class="drawings">'] if drawn else []
-        lines += [_part(part) for part in parts]
+        lines += [_part(*pair) for pair in parts]
         lines += ["</div>"] if drawn else []
     return lines
 
 
-def _part(part: str | Table | Drawing) -> str:
-    if isinstance(part, str):
-        return f"<p>{escape(part)}</p>"
-    if isinstance(part, Drawing):
-        return f"<figure>{part.svg}<figcaption>{escape(part.caption)}</figcaption></figure>"
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in part.head)
-    rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in part.rows)
-    # a wide table scrolls within its box, also by keyboard; a shade at its edge shows that there is more
-    return f'<div class="table" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+def _part(part: str | Table | Drawing, other: str | Table | Drawing) -> str:
+    if isinstance(part, Drawing) and isinstance(other, Drawing):
+        return f"<figure>{part.svg}<figcaption>{_both(part.caption, other.caption)}</figcaption></figure>"
+    if isinstance(part, Table) and isinstance(other, Table):
+        head, *rows = (
+            [_both(*cells) for cells in zip(*pair, strict=True)]
+            for pair in zip((part.head, *part.rows), (other.head, *other.rows), strict=True)
+        )
+        heads = "".join(f"<th>{cell}</th>" for cell in head)
+        lines = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+        # a wide table scrolls within its box, also by keyboard; a shade at its edge shows that there is more
+        table = f"<table><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table>"
+        return f'<div class="table" tabindex="0">{table}</div>'
+    return f"<p>{_both(str(part), str(other))}</p>"

@@ -1,19 +1,28 @@
 """The protocol for the geodesist: everything that was found, and what was refused."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from analysis.report.protocol import WORST_RAYS, protocol, write_protocol
+from analysis.report.protocol_norwegian import norwegian
 from analysis.result.model import CameraMove, CameraOffset, MeasuredRecording, RayTest
 from photogrammetry.procedures.orientation import orient
-from photogrammetry.reports.document import as_text
-from rig.phrase import plain
+from photogrammetry.reports.document import Report, Table, as_text
+from rig.phrase import phrase, plain
 from rig.pulse import PulseNumber
 from tests.analysis.report.jumps import measured_recording, measurements
 from tests.photogrammetry.synthetic import hill
+
+#: What is called the same in Norwegian, and names.
+_SAME = {
+    "ball", "parameter", "a priori", "omega", "phi", "kappa", "rms vx", "rms vy", "sigma", "sigma (ms)", "sigma0",
+    *(f"sigma {name}" for name in ("1", "2", "3", "X", "Y", "Z", "X0", "Y0", "Z0", "omega", "phi", "kappa")),
+    *(f"hill-{image}{what}" for image in (1, 2, 3) for what in ("", " X0", " Z0", " angle 1", " angle 2")),
+}  # fmt: skip
 
 
 def _text(result: MeasuredRecording) -> str:
@@ -91,7 +100,35 @@ def test_the_adjustment_of_the_balls_is_part_of_it() -> None:
     assert text.index("Jump 1: verdict") < text.index("Network of balls")
 
 
-def test_text_and_page_are_written(tmp_path: Path) -> None:
+def test_text_is_english_and_the_page_is_norwegian_too(tmp_path: Path) -> None:
     text, page = write_protocol(measured_recording(), measurements(), tmp_path / "new")
     assert text.read_text().startswith("Protocol of recording simulated")
-    assert "<h2>Synchrony</h2>" in page.read_text()
+    assert '<h2><span lang="en">Synchrony</span><span lang="nb">Samtidighet</span></h2>' in page.read_text()
+    assert "<td>K1</td>" in page.read_text()  # what is the same in both stands once
+
+
+def test_every_sentence_and_every_head_has_its_norwegian() -> None:
+    result, measured = measured_recording(), measurements()
+    verdict = phrase("jump_counted", "all points in {count} of {pulses} pulses in sight", count=24, pulses=25)
+    jump = replace(
+        result.jumps[0], verdict=replace(result.jumps[0].verdict, message=f"measured well: {verdict}", said=(verdict,))
+    )
+    counts = "camera K1: 14 of 15 surveyed balls in sight named, 21 balls measured, 35 round spots found"
+    result = replace(result, jumps=(jump,), orientation=replace(result.orientation, messages=(counts,)))
+    english = protocol(result, measured, orient(hill(1).network))
+    texts = list(zip(_texts(english), _texts(norwegian(english, result)), strict=True))
+    assert {one for one, other in texts if one == other and re.search("[a-z]{3}", one)} == _SAME
+    said = dict(texts)
+    assert said[f"reliable: measured well: {verdict}"] == "pålitelig: godt målt: alle punkter i 24 av 25 pulser i sikte"
+    assert said["athlete: A. Jumper; bib: 7"] == "utøver: A. Jumper; startnummer: 7"
+    assert said[counts].startswith("kamera K1: 14 av 15 innmålte baller i sikte har fått navn")
+
+
+def _texts(report: Report) -> Iterator[str]:
+    for section in report.sections:
+        yield section.title
+        for part in section.parts:
+            if isinstance(part, Table):
+                yield from (*part.head, *(cell for row in part.rows for cell in row))
+            else:
+                yield part if isinstance(part, str) else part.caption

@@ -9,6 +9,7 @@ from statistics import median
 from typing import Any, Final
 
 from bench.service.catalogue import write_jump
+from bench.service.rendering import rendered
 from bench.service.serving import ServedRig, served_rig
 from recorder.reading.corrected_log import corrected_log
 from rig.api.jump import LastJump, MeasuredValue
@@ -55,7 +56,7 @@ def run_listing(directory: Path) -> list[dict[str, Any]]:
     Returns:
         A case for each query, and for all that a page asks for: the median time by clock once the service was asked the
         same before, beside that of the first answer of a service that has just been started; and the processor's time
-        of both.
+        of both. Then a case for each page that a browser draws, where the computer has one.
 
     Raises:
         ProcessDiedError: the service fails.
@@ -66,9 +67,11 @@ def run_listing(directory: Path) -> list[dict[str, Any]]:
         _write_logs(folder)
         with served_rig(folder) as service:  # reads all logs, and keeps what it read
             [_ask(service, (path,)) for path in _ALL]
+            drawn = rendered(service, _LOGS)
         return [
             *(_measure(folder, name, (path,)) for name, path in _QUERIES.items()),
             *(_measure(folder, name, paths) for name, paths in _PAGES.items()),
+            *drawn,
         ]
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -25,14 +25,15 @@ class ServedRig:
 
     Attributes:
         pid: of the service's process.
+        url: its address.
         data: folder of its recordings.
     """
 
     def __init__(self, pid: int, port: int, data: Path) -> None:
-        self.pid, self.data = pid, data
+        self.pid, self.url, self.data = pid, f"http://127.0.0.1:{port}", data
         # The service closes a connection that has been idle for 5 s: the client must not use it when that is near.
         self._client = httpx.Client(
-            base_url=f"http://127.0.0.1:{port}", timeout=_START_S, trust_env=False, verify=False,  # noqa: S501 - no TLS
+            base_url=self.url, timeout=_START_S, trust_env=False, verify=False,  # noqa: S501 - no TLS
             limits=httpx.Limits(keepalive_expiry=2.0),
         )  # fmt: skip
 

@@ -120,6 +120,18 @@ def test_an_athletes_page_is_reached_by_the_name_and_draws_each_figure_day_by_da
     expect(page.locator("#athlete-empty")).to_have_text("No jump was measured here yet.")
 
 
+def test_a_long_table_is_filled_and_sorted_to_its_end(panel: Panel, service: MemoryService, open_page: Open) -> None:
+    for number in range(200):
+        keep_jump(service.catalogue.directory, number, NOON - timedelta(minutes=number), "Ola")
+    page = open_page(f"{panel.url}/#/athlete/ola", timezone_id="Europe/Oslo")
+    rows = page.locator("#athlete-table tbody tr")
+    expect(rows).to_have_count(200)
+    page.get_by_role("button", name="Take-off speed").click()
+    expect(rows).to_have_count(200)
+    expect(rows.first.locator("td").nth(2)).to_have_text("26.00 ± 0.05\u202fm/s")
+    expect(rows.last.locator("td").nth(2)).to_have_text("26.40 ± 0.05\u202fm/s")
+
+
 @pytest.mark.long
 def test_two_days_are_compared_by_the_service(panel: Panel, service: MemoryService, open_page: Open) -> None:
     for place, angle in enumerate((0.0, 1.0, 0.0, 10.0, 11.0, 10.0)):

@@ -1,7 +1,6 @@
 /** A figure of an athlete's jumps, day by day: dots with their standard deviations, the mean of each day and how his jumps scatter. */
 
-import { languageInUse } from "../i18n/i18n.js";
-import { number } from "../shared/format.js";
+import { number, timeInWords } from "../shared/format.js";
 
 /** @typedef {{ day: string, value: number, sigma: number, good: boolean }} Dot */
 
@@ -84,7 +83,7 @@ function rangeOf(dots) {
 
 /** @param {string} day */
 function shortDay(day) {
-  return new Date(`${day}T12:00`).toLocaleDateString(languageInUse(), { day: "numeric", month: "short" });
+  return timeInWords(new Date(`${day}T12:00`), { day: "numeric", month: "short" });
 }
 
 /**

@@ -1,9 +1,9 @@
 /** A table of measured jumps that is sorted by a tap on a heading. */
 
-import { languageInUse, t } from "../i18n/i18n.js";
+import { t } from "../i18n/i18n.js";
 import { make, makeMark } from "../shared/dom.js";
 import { levelOf, MARKS } from "../shared/figures.js";
-import { timeOfDay } from "../shared/format.js";
+import { timeInWords, timeOfDay } from "../shared/format.js";
 import { FIGURES, figureInWords, figureOf } from "./figures.js";
 
 /** @typedef {import("./types.js").AthleteJump} AthleteJump */
@@ -31,6 +31,9 @@ const MEASURED = FIGURES.map((figure) => ({
 /** @type {Column} */
 const LEVEL = { key: "athletes.level", order: (jump) => ["good", "info", "warning"].indexOf(level(jump)), cell: (jump) => makeMark(level(jump), level(jump), t(MARKS[level(jump)])) };
 
+/** So many rows are made before the first pause. */
+const AT_ONCE = 60;
+
 /** Columns of the table of a session. */
 export const OF_SESSION = [TIME, BIB, ATHLETE, GATE, ...MEASURED, LEVEL];
 /** Columns of the table of an athlete. */
@@ -44,7 +47,7 @@ export const OF_ATHLETE = [WHEN, GATE, ...MEASURED, LEVEL];
 function shortTime(time) {
   const then = new Date(time);
   const year = then.getFullYear() === new Date().getFullYear() ? undefined : "2-digit";
-  return then.toLocaleString(languageInUse(), { day: "numeric", month: "short", year, hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
+  return timeInWords(then, { day: "numeric", month: "short", year, hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
 }
 
 /** @param {AthleteJump} jump */
@@ -85,7 +88,7 @@ export function makeTable(place, columns, newestFirst) {
     place.replaceChildren(make("table", { class: "jumps" },
       make("thead", {}, make("tr", {}, ...columns.map((column) => make("th", { "aria-sort": column === by ? (down ? "descending" : "ascending") : "none" },
         make("button", { type: "button", class: "plain", "data-sort": column.key, onclick: () => sort(column) }, t(column.key), make("span", { "aria-hidden": "true" }, column === by ? (down ? " ▾" : " ▴") : "")))))),
-      make("tbody", {}, ...sorted(shown, by, down).map((jump) => make("tr", {}, ...columns.map((column) => make("td", {}, column.cell(jump))))))));
+      fillBody(make("tbody"), sorted(shown, by, down), columns)));
     if (focused) /** @type {HTMLElement|null} */ (place.querySelector(`[data-sort="${focused}"]`))?.focus({ preventScroll: true });
   };
   /** @param {Column} column */
@@ -95,6 +98,21 @@ export function makeTable(place, columns, newestFirst) {
     draw();
   };
   return (jumps) => { shown = jumps; draw(); };
+}
+
+/**
+ * Add the rows: a screenful at once and the others after it is drawn, each time twice as many, since the table is laid out anew.
+ *
+ * @param {HTMLElement} body
+ * @param {AthleteJump[]} jumps
+ * @param {Column[]} columns
+ * @param {number} [count]
+ */
+function fillBody(body, jumps, columns, count = AT_ONCE) {
+  body.append(...jumps.slice(0, count).map((jump) => make("tr", {}, ...columns.map((column) => make("td", {}, column.cell(jump))))));
+  const rest = jumps.slice(count);
+  if (rest.length) requestAnimationFrame(() => setTimeout(() => { if (body.isConnected) fillBody(body, rest, columns, 2 * count); }));
+  return body;
 }
 
 /**

@@ -155,7 +155,9 @@ class Service(Archive):
                 if (state := self.status().state) is not State.IDLE:
                     raise StateForbidsError(FORBIDDEN["rehearse", state])
                 if not self._examining.acquire(blocking=False):
-                    raise StateForbidsError("the rig is being checked: wait until that is done, then rehearse")
+                    raise StateForbidsError(
+                        phrase("rehearse_checking", "the rig is being checked: wait until that is done, then rehearse")
+                    )
                 try:
                     self._rehearser.begin(order.seconds)
                 finally:
@@ -175,7 +177,11 @@ class Service(Archive):
         """Start; returns when the log is open. What lies in the trash makes room for it if it must."""
         supervisor, status = self._supervisor, self.status()
         if status.rehearsal is not None and status.state is State.IDLE:
-            raise RehearsingError("a rehearsal has the cameras: arm the rig, which ends it, then start recording")
+            raise RehearsingError(
+                phrase(
+                    "rehearsing_record", "a rehearsal has the cameras: arm the rig, which ends it, then start recording"
+                )
+            )
         if status.state is State.ARMED:
             self.exports.tidy()
             self._keeper.make_room(supervisor.rig.recorder.jump_s if order.duration_s is None else order.duration_s)
@@ -227,7 +233,13 @@ class Service(Archive):
             return recordings.current is not None and recordings.current.id == recording_id
 
         if self._supervisor.commands.ask(at_once(in_progress), _SOON_S):
-            raise StateForbidsError(f"recording {recording_id} is in progress: stop it before deleting it")
+            raise StateForbidsError(
+                phrase(
+                    "recording_in_progress",
+                    "recording {recording} is in progress: stop it before deleting it",
+                    recording=recording_id,
+                )
+            )
         return self._with_next_part(self._catalogue.delete(recording_id))
 
     def restore_recording(self, recording_id: str) -> Recording:
@@ -267,7 +279,12 @@ class Service(Archive):
     def change_light(self, camera: str, change: LightChange) -> CameraLight:
         """Change exposure, gain or region of a camera; it is away for a moment if the rig is armed."""
         if self._rehearser.progress is not None:
-            raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change their settings")
+            raise RehearsingError(
+                phrase(
+                    "rehearsing_settings",
+                    "a rehearsal has the cameras: wait until it is done, then change their settings",
+                )
+            )
         return self._lights.change(camera, change)
 
     @property
@@ -282,7 +299,9 @@ class Service(Archive):
     def change_trigger(self, change: TriggerChange) -> TriggerView:
         """Change the rate of the pulses; if the rig is armed, it is armed anew. Stop or start them."""
         if self._rehearser.progress is not None:
-            raise RehearsingError("a rehearsal has the cameras: wait until it is done, then change the rate")
+            raise RehearsingError(
+                phrase("rehearsing_rate", "a rehearsal has the cameras: wait until it is done, then change the rate")
+            )
         return self._trains.change(change)
 
     def burst(self, order: BurstOrder) -> TriggerView:

@@ -88,13 +88,24 @@ class Trains:
             return
         if controls:
             raise StateForbidsError(
-                f'with trigger.source = "{rig.trigger.source}" only the rate can be changed: disarm to stop the pulses'
+                phrase(
+                    "pulses_rate_only",
+                    'with trigger.source = "{source}" only the rate can be changed: disarm to stop the pulses',
+                    source=rig.trigger.source,
+                )
             )
         if any(camera.backend == "replay" for camera in rig.cameras):
-            raise StateForbidsError("the pulses are those of the replayed log: replay a log of another rate")
+            raise StateForbidsError(
+                phrase("rate_replayed", "the pulses are those of the replayed log: replay a log of another rate")
+            )
         raise StateForbidsError(
-            f'a generator that svev does not drive makes the pulses (trigger.source = "{rig.trigger.source}"): change '
-            "its rate there and trigger.rate_hz in the rig file, then start the service again"
+            phrase(
+                "rate_foreign",
+                "a generator that svev does not drive makes the pulses (trigger.source = "
+                '"{source}"): change its rate there and trigger.rate_hz in the rig file, then start '
+                "the service again",
+                source=rig.trigger.source,
+            )
         )
 
     def _change_rate(self, rate_hz: float) -> None:
@@ -131,7 +142,14 @@ def _check_dead_time(rig: RigSettings) -> None:
         busy_ns = round(camera.exposure_us * NS_PER_US) + READOUT_NS
         if camera.backend == "iidc" and busy_ns >= rig.trigger.period_ns:
             raise BadInputError(
-                f"at {rig.trigger.rate_hz:g} Hz pulses would come every {rig.trigger.period_ns / 1e6:.1f} ms, and "
-                f"exposure and readout of camera {camera.name} take {busy_ns / 1e6:.1f} ms: choose a lower rate, or "
-                "shorten its exposure first"
+                phrase(
+                    "rate_too_high",
+                    "at {rate:g} Hz pulses would come every {every:.1f} ms, and exposure and readout of "
+                    "camera {camera} take {busy:.1f} ms: choose a lower rate, or shorten its exposure "
+                    "first",
+                    rate=rig.trigger.rate_hz,
+                    every=rig.trigger.period_ns / 1000000.0,
+                    camera=camera.name,
+                    busy=busy_ns / 1000000.0,
+                )
             )

@@ -38,6 +38,7 @@ from rig.errors import LogDamagedError, StillRecordingError, StorageError, Unkno
 from rig.host.file_names import ID_BYTES_MAX, give_name, is_recording_id
 from rig.host.files import make_folder, opened_folder
 from rig.images.picture import shown
+from rig.phrase import phrase
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 
@@ -128,7 +129,12 @@ class Catalogue:
             place = self._logs.image_places(reader, pulse).get(PulseNumber(pulse))
             if place is None:
                 raise UnknownRecordingError(
-                    f"recording {recording} has no image of pulse {pulse}: choose another pulse"
+                    phrase(
+                        "pulse_no_image",
+                        "recording {recording} has no image of pulse {pulse}: choose another pulse",
+                        recording=recording,
+                        pulse=pulse,
+                    )
                 )
             try:
                 stored, pixels = stored_image(reader, pulse, *place)
@@ -196,7 +202,13 @@ class Catalogue:
         with self._change():
             path = self._path(recording)
             if is_being_written(path):
-                raise StillRecordingError(f"recording {recording} is still being written: stop it first")
+                raise StillRecordingError(
+                    phrase(
+                        "recording_being_written",
+                        "recording {recording} is still being written: stop it first",
+                        recording=recording,
+                    )
+                )
             if path.parent != self._trash:
                 make_folder(self._trash)
                 log, path = path, self._free_path(path, self._trash)

@@ -8,6 +8,7 @@ from typing import Final
 
 from rig.errors import BadInputError
 from rig.host.disk import replace_file
+from rig.phrase import phrase
 
 _NAME: Final = re.compile(r"([1-9][0-9]{0,5})_pulse-([1-9][0-9]{0,15})\.webm")
 #: How a WebM file begins: the EBML head (RFC 8794, 11.2.1), which names its document type within the first bytes.
@@ -69,7 +70,9 @@ def check_voice(data: bytes) -> None:
         BadInputError: it is not.
     """
     if not data.startswith(_EBML) or _WEBM not in data[:_HEAD]:
-        raise BadInputError("this is no WebM file: send what a browser records as audio/webm")
+        raise BadInputError(
+            phrase("voice_note_no_webm", "this is no WebM file: send what a browser records as audio/webm")
+        )
 
 
 def add_voice_note(log: Path, pulse: int, data: bytes) -> None:

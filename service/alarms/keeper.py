@@ -80,7 +80,13 @@ class AlarmKeeper:
             if alarm.number == number:
                 self._known[topic] = alarm.model_copy(update={"acknowledged": True})
                 return
-        raise UnknownAlarmError(f"there is no alarm {number} any more: it is over, or has got worse and a new number")
+        raise UnknownAlarmError(
+            phrase(
+                "alarm_gone",
+                "there is no alarm {number} any more: it is over, or has got worse and a new number",
+                number=number,
+            )
+        )
 
     def measuring(self, refused: Phrase | None) -> None:
         """Enter whether jumps can be measured; that they cannot stays whatever becomes of the recorder.

@@ -93,7 +93,9 @@ class Marks:
             StateForbidsError: nothing is watched for motion.
         """
         if self._motion is None:
-            raise StateForbidsError("nothing is watched for motion: add [automatic.motion] to the rig file")
+            raise StateForbidsError(
+                phrase("motion_unwatched", "nothing is watched for motion: add [automatic.motion] to the rig file")
+            )
         if self._motion.on != change.on:
             self._motion.on = change.on
             on = phrase("event_motion_on", "recordings begin by themselves when something moves")
@@ -155,7 +157,12 @@ def _age_s(mark: JumpMark) -> float:
     age_s = (datetime.now(UTC) - mark.time).total_seconds()
     if not -_CLOCKS_S < age_s < _MARK_S:
         raise BadInputError(
-            f"the mark is {age_s:.1f} s old: give a time of the last {_MARK_S:g} s, by a clock that agrees with this "
-            "computer's to a second, or none"
+            phrase(
+                "mark_old",
+                "the mark is {age:.1f} s old: give a time of the last {most:g} s, by a clock that "
+                "agrees with this computer's to a second, or none",
+                age=age_s,
+                most=_MARK_S,
+            )
         )
     return max(0.0, age_s)

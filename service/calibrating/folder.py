@@ -13,6 +13,7 @@ from rig.api.calibrating import CalibratingOrder
 from rig.errors import StorageError
 from rig.host.disk import replace_file
 from rig.host.files import TEXT_MAX, read_whole
+from rig.phrase import phrase
 from rig.settings.camera import Region
 
 #: In the folder of the recordings.
@@ -72,7 +73,14 @@ def new_set(directory: Path, order: CalibratingOrder, regions: Mapping[str, Regi
         (folder / PICTURES).mkdir(parents=True)
         replace_file(folder / _SET, _PRINTED.dump_json((order, dict(regions)), indent=2), links=False)
     except OSError as error:
-        raise StorageError(f"{folder}: cannot be made ({error.strerror}); look at the disk") from error
+        raise StorageError(
+            phrase(
+                "calibrating_no_folder",
+                "{folder}: cannot be made ({why}); look at the disk",
+                folder=str(folder),
+                why=str(error.strerror),
+            )
+        ) from error
     return PictureSet(folder, order, regions)
 
 

@@ -19,6 +19,7 @@ from rig.phrase import as_plain, phrase
 from rig.settings.camera import Region
 from rig.settings.model import RigSettings
 from service.calibrating.folder import MOST, RESULT, PictureSet, last_set, new_set, numbers, remove_last
+from service.calibrating.refusals import COMPUTING, IN_USE, NO_CALIBRATION, NO_PICTURE, NO_PICTURES, NO_PROTOCOL
 from service.calibrating.said import lens, problem_in, seen
 
 #: Without anybody who looks at it, the helper ends after so long a time.
@@ -114,17 +115,19 @@ class CalibrationHelper:
         """
         with self._commands:
             if self._state is CalibratingState.COMPUTING:
-                raise StateForbidsError(
-                    "a calibration is being computed: wait until it is done, then take pictures away"
-                )
+                raise StateForbidsError(COMPUTING)
             self._check_unsaved()
             try:
                 if self._set is None or not remove_last(self._set.pictures):
-                    raise StateForbidsError(
-                        "there is no picture to take away: hold the target still before the cameras"
-                    )
+                    raise StateForbidsError(NO_PICTURE)
             except OSError as error:
-                raise StorageError(f"the picture cannot be removed ({error.strerror}): look at the disk") from error
+                raise StorageError(
+                    phrase(
+                        "calibrating_picture_stays",
+                        "the picture cannot be removed ({why}): look at the disk",
+                        why=str(error.strerror),
+                    )
+                ) from error
             with self._lock:
                 if self._state in {CalibratingState.DONE, CalibratingState.FAILED}:
                     self._state, self._problem, self._lenses = CalibratingState.OFF, None, ()
@@ -141,9 +144,7 @@ class CalibrationHelper:
                 return self.view()
             self._check_unsaved()
             if self._set is None or not numbers(self._set.pictures):
-                raise StateForbidsError(
-                    "there are no pictures to compute from: hold the target before the cameras first"
-                )
+                raise StateForbidsError(NO_PICTURES)
             self._end()
             with self._lock:
                 self._problem, self._lenses, self._saved = None, (), False
@@ -160,13 +161,17 @@ class CalibrationHelper:
         """
         with self._commands:
             if self._state is not CalibratingState.DONE or self._set is None:
-                raise StateForbidsError("there is no calibration yet: compute it, then put it into the rig file")
+                raise StateForbidsError(NO_CALIBRATION)
             now = self._regions()
             changed = [name for name, region in self._set.regions.items() if now.get(name) != region]
             if changed:
                 raise StateForbidsError(
-                    f"the region of {', '.join(changed)} was changed since the pictures were taken: give it back, or "
-                    "take pictures anew"
+                    phrase(
+                        "calibrating_region",
+                        "the region of {cameras} was changed since the pictures were taken: give it back, or "
+                        "take pictures anew",
+                        cameras=", ".join(changed),
+                    )
                 )
             self._keep(self._set.folder / RESULT)
             with self._lock:
@@ -180,7 +185,7 @@ class CalibrationHelper:
             StateForbidsError: none is computed.
         """
         if self._state is not CalibratingState.DONE or self._set is None:
-            raise StateForbidsError("there is no protocol yet: compute the calibration first")
+            raise StateForbidsError(NO_PROTOCOL)
         return self._set.folder / "protocol.html"
 
     def close(self) -> None:
@@ -194,7 +199,7 @@ class CalibrationHelper:
     def _check_unsaved(self) -> None:
         """Check that the rig file does not name what is computed from these pictures."""
         if self._saved:
-            raise StateForbidsError("the calibration by these pictures is in the rig file: begin anew for another one")
+            raise StateForbidsError(IN_USE)
 
     def _seen(self, regions: Mapping[str, Region]) -> tuple[SeenTarget, ...]:
         cameras, looking = self._news.get("cameras", {}), self._state is CalibratingState.LOOKING

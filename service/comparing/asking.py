@@ -14,6 +14,7 @@ from rig.api.comparison import Comparison, Span
 from rig.api.statement import Level
 from rig.background.child import run_child
 from rig.errors import BadInputError, StateForbidsError
+from rig.phrase import phrase
 from service.measuring.results import result_file
 
 #: Two jumps take some two seconds, a season of one athlete some ten.
@@ -48,12 +49,14 @@ class Comparisons:
             BadInputError: there are too few jumps, the spans overlap, or the jumps cannot be compared.
         """
         if first.since < second.until and second.since < first.until:
-            raise BadInputError("the spans overlap: choose two that have no day in common")
+            raise BadInputError(phrase("comparing_overlap", "the spans overlap: choose two that have no day in common"))
         compared = [[each for each in jumps if span.since <= each.jump.time < span.until] for span in (first, second)]
         groups = [self._comparable(group)[:_MOST] for group in compared]
         used = [len(group) for group in groups]
         if not all(used):
-            raise BadInputError("a span has no jump that was measured well: choose another one")
+            raise BadInputError(
+                phrase("comparing_empty", "a span has no jump that was measured well: choose another one")
+            )
         days: dict[date, list[AthleteJump]] = defaultdict(list)
         for each in (each for each in jumps if not any(each in group for group in compared)):
             days[each.jump.time.date()].append(each)
@@ -76,7 +79,9 @@ class Comparisons:
         """
         shown = [self._with_result(each) for each in jumps]
         if None in shown:
-            raise BadInputError("one of the jumps was not measured in its log: measure it, then compare")
+            raise BadInputError(
+                phrase("comparing_unmeasured", "one of the jumps was not measured in its log: measure it, then compare")
+            )
         return str(self._ask({"jumps": shown + self._comparable(others)[:_MOST_OTHERS], "language": language})["page"])
 
     def _comparable(self, jumps: Sequence[AthleteJump]) -> list[dict[str, Any]]:
@@ -96,7 +101,11 @@ class Comparisons:
     def _ask(self, what: dict[str, Any]) -> dict[str, Any]:
         deadline = time.monotonic() + _DEADLINE_S
         if self._busy() or not self._turn.acquire(timeout=_DEADLINE_S):
-            raise StateForbidsError("jumps are not compared while a recording runs: try again when it has ended")
+            raise StateForbidsError(
+                phrase(
+                    "comparing_recording", "jumps are not compared while a recording runs: try again when it has ended"
+                )
+            )
         try:
             end = run_child(
                 "service.comparing.program",
@@ -107,11 +116,18 @@ class Comparisons:
                 hold=lambda _: None,
             )
         except OSError as error:
-            raise StateForbidsError(f"the jumps cannot be compared ({error.strerror}): try again") from error
+            raise StateForbidsError(
+                phrase("comparing_failed", "the jumps cannot be compared ({why}): try again", why=str(error.strerror))
+            ) from error
         finally:
             self._turn.release()
         if end is None:
-            raise StateForbidsError("the jumps are not compared yet after a minute: try again when nothing is recorded")
+            raise StateForbidsError(
+                phrase(
+                    "comparing_late",
+                    "the jumps are not compared yet after a minute: try again when nothing is recorded",
+                )
+            )
         if "problem" in end:
             raise BadInputError(end["problem"]["text"])
         return end

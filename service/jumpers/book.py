@@ -254,7 +254,9 @@ class JumperBook:
         with self._lock:
             if order.version not in {None, self._list.version}:
                 raise ChangedMeanwhileError(
-                    "the start list has changed since: look at it, then undo what is to be undone"
+                    phrase(
+                        "list_changed", "the start list has changed since: look at it, then undo what is to be undone"
+                    )
                 )
             if not self._changes:
                 text = "there is nothing to undo: no earlier start list is kept"
@@ -293,7 +295,12 @@ class JumperBook:
         if number not in {None, self._list.next.number}:
             name = who(self._list.next.session)
             raise ChangedMeanwhileError(
-                f"the next jumper is {name} by now: look at the name, and correct the jump before in the list of jumps"
+                phrase(
+                    "list_other_next",
+                    "the next jumper is {name} by now: look at the name, and correct the jump before in "
+                    "the list of jumps",
+                    name=name,
+                )
             )
 
     def _free_bib(self, bib: str, line: int | None = None) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from rig.api.recordings import NextJumper, SessionFields
 from rig.api.start_list import NewLine, StartLine, StartList, TurnMark
 from rig.errors import UnknownLineError
+from rig.phrase import phrase
 
 
 def line_of(start_list: StartList, line: int) -> StartLine:
@@ -16,7 +17,11 @@ def line_of(start_list: StartList, line: int) -> StartLine:
     for each in start_list.lines:
         if each.id == line:
             return each
-    raise UnknownLineError(f"the start list has no line {line}: see the list, somebody may have removed it")
+    raise UnknownLineError(
+        phrase(
+            "list_no_line", "the start list has no line {line}: see the list, somebody may have removed it", line=line
+        )
+    )
 
 
 def with_line(start_list: StartList, changed: StartLine) -> StartList:

@@ -11,6 +11,7 @@ from rig.background.program import Teller, serve
 from rig.errors import StorageError
 from rig.host.disk import ask_free_bytes, sync
 from rig.host.files import open_to_read
+from rig.phrase import phrase
 
 _PIECE: Final = 1 << 22
 
@@ -19,13 +20,24 @@ def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     """Copy the files and folders of `paths` into the folder `to`, each whole or absent; what is there already stays."""
     to = Path(asked["to"])
     if not to.is_dir():
-        raise StorageError(f"{to}: the folder for copies is not there; connect its disk, then measure again")
+        raise StorageError(
+            phrase(
+                "copying_no_folder",
+                "{folder}: the folder for copies is not there; connect its disk, then measure again",
+                folder=str(to),
+            )
+        )
     sources = [Path(each) for each in asked["paths"]]
     wanted = [source for source in sources if source.exists() and not _is_copied(source, to / source.name)]
     sizes = [sum(path.stat().st_size for path in _files(source)) for source in wanted]
     if ask_free_bytes(to) < sum(sizes):
         raise StorageError(
-            f"{to}: has not the {sum(sizes) / 1e9:.1f} GB free that the copy takes; make room, then measure again"
+            phrase(
+                "copying_no_room",
+                "{folder}: has not the {gb:.1f} GB free that the copy takes; make room, then measure again",
+                folder=str(to),
+                gb=sum(sizes) / 1000000000.0,
+            )
         )
     done, everything = 0, max(1, sum(sizes))
     for source in wanted:
@@ -56,7 +68,13 @@ def _is_copied(source: Path, target: Path) -> bool:
         return False
     ours, there = source.stat(), target.stat()
     if ours.st_size != there.st_size:
-        raise StorageError(f"{target}: is another log of this name; move it away, then measure again")
+        raise StorageError(
+            phrase(
+                "copying_other_log",
+                "{path}: is another log of this name; move it away, then measure again",
+                path=str(target),
+            )
+        )
     return True
 
 

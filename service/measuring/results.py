@@ -15,6 +15,7 @@ from rig.api.recordings import SessionFields
 from rig.api.statement import Statement
 from rig.errors import BadInputError, StateForbidsError
 from rig.host.files import TEXT_MAX, open_to_read, opened_folder, read_whole
+from rig.phrase import phrase
 from service.measuring.outcome import NAME, Outcome, read_outcome
 from service.seam.archive import Download
 
@@ -87,7 +88,14 @@ def jumps_in_full(log: Path) -> tuple[dict[str, Any], ...]:
     except FileNotFoundError:
         return ()
     except (OSError, ValueError, LookupError, TypeError) as error:
-        raise StateForbidsError(f"{log.name}: {_JUMPER} of its result cannot be read: measure it again") from error
+        raise StateForbidsError(
+            phrase(
+                "measuring_result_damaged",
+                "{log}: {file} of its result cannot be read: measure it again",
+                log=log.name,
+                file=_JUMPER,
+            )
+        ) from error
 
 
 def result_downloads(log: Path, name: str) -> list[Download]:

@@ -51,7 +51,13 @@ class WaitingLogs:
             if recording in self._ids:
                 return
             if len(self._ids) >= _MOST:
-                raise StateForbidsError(f"{_MOST} logs are waiting already: wait until some are measured")
+                raise StateForbidsError(
+                    phrase(
+                        "measuring_queue_full",
+                        "{count} logs are waiting already: wait until some are measured",
+                        count=_MOST,
+                    )
+                )
             self._ids.insert(0 if first else len(self._ids), recording)
 
     def remove(self, recording: str) -> None:

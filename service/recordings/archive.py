@@ -13,6 +13,7 @@ from recorder.catalogue.trash import TrashContents
 from rig.api.export import ExportJob, ExportOrder
 from rig.api.recordings import Pulses, Recording, RecordingQuery, Trash
 from rig.errors import StateForbidsError, StillRecordingError
+from rig.phrase import phrase
 from service.exports.jobs import Exports
 from service.measuring.queue import Measurings
 from service.measuring.results import result_downloads
@@ -91,7 +92,13 @@ class Archive(ArchiveResults, ArchiveNotes):
             StateForbidsError: it does not lie in the trash.
         """
         if not self._catalogue.entry(recording_id, prefer_deleted=True).deleted:
-            raise StateForbidsError(f"recording {recording_id} is not in the trash: delete it first")
+            raise StateForbidsError(
+                phrase(
+                    "recording_not_in_trash",
+                    "recording {recording} is not in the trash: delete it first",
+                    recording=recording_id,
+                )
+            )
         return _as_trash(self._catalogue.remove(recording_id))
 
     def download(self, recording_id: str) -> Download:
@@ -119,7 +126,13 @@ class Archive(ArchiveResults, ArchiveNotes):
         current = self.status().recording
         here = current is not None and current.id == recording_id
         if here or self._catalogue.entry(recording_id).state is LogState.WRITING:
-            raise StillRecordingError(f"recording {recording_id} is still being written: stop it first")
+            raise StillRecordingError(
+                phrase(
+                    "recording_being_written",
+                    "recording {recording} is still being written: stop it first",
+                    recording=recording_id,
+                )
+            )
 
     def checksum(self, recording_id: str, wanted: Callable[[], bool]) -> str:
         """SHA-256 of that file, in hexadecimal.

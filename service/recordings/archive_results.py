@@ -12,6 +12,7 @@ from rig.api.looking import Moment, MomentKind
 from rig.api.measuring import Measurement
 from rig.api.status import Status
 from rig.errors import BadInputError, StateForbidsError, UnknownRecordingError
+from rig.phrase import phrase
 from service.comparing.asking import Comparisons
 from service.measuring.queue import Measurings
 from service.measuring.results import is_outdated, jumps_in_full, result_file
@@ -77,7 +78,7 @@ class ArchiveResults(ABC):
             BadInputError: it is one and the same, or they cannot be compared.
         """
         if first == second:
-            raise BadInputError("this is one jump: choose another one to compare it with")
+            raise BadInputError(phrase("comparing_one", "this is one jump: choose another one to compare it with"))
         known = self.measured_jumps(JumpQuery())
         by_id = {(each.jump.recording, each.jump.jump): each for each in known}
         if missing := [jump for jump in (first, second) if jump not in by_id]:
@@ -94,7 +95,13 @@ class ArchiveResults(ABC):
             StateForbidsError: it lies in the trash, or the rig file does not say where the balls are.
         """
         if self._catalogue.entry(recording_id).deleted:
-            raise StateForbidsError(f"recording {recording_id} is in the trash: restore it, then measure it")
+            raise StateForbidsError(
+                phrase(
+                    "recording_in_trash",
+                    "recording {recording} is in the trash: restore it, then measure it",
+                    recording=recording_id,
+                )
+            )
         return self._measurings.want(recording_id, self._catalogue.file(recording_id))
 
     def give_up_measuring(self, recording_id: str) -> Measurement:
@@ -114,7 +121,14 @@ class ArchiveResults(ABC):
         if file is None:
             raise UnknownRecordingError(f"recording {recording_id} has no result {name[:100]!r}: measure it")
         if bears_names(name) and is_outdated(log):
-            raise StateForbidsError(f"{name} of {recording_id} gets the corrected name: try again in a moment")
+            raise StateForbidsError(
+                phrase(
+                    "result_renaming",
+                    "{file} of {recording} gets the corrected name: try again in a moment",
+                    file=name,
+                    recording=recording_id,
+                )
+            )
         return file
 
     def moment(self, recording_id: str, *, jump: int = 1, by_motion: bool = False) -> Moment:

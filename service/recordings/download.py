@@ -13,6 +13,7 @@ from recorder.catalogue.entry import Entry
 from recorder.log.session_changes import session_changes
 from recorder.reading.corrected_log import corrected_log
 from rig.errors import BadInputError, StateForbidsError
+from rig.phrase import phrase
 from service.seam.archive import Download
 
 #: What a part of a file's name may hold on every system; letters are those of any language.
@@ -68,7 +69,9 @@ def sha256_of(download: Download, wanted: Callable[[], bool]) -> str:
     with download.open() as file:
         while piece := file.read(_PIECE):
             if not wanted():
-                raise StateForbidsError("nobody waits for the checksum any more: ask for it again")
+                raise StateForbidsError(
+                    phrase("checksum_unwanted", "nobody waits for the checksum any more: ask for it again")
+                )
             digest.update(piece)
     return digest.hexdigest()
 

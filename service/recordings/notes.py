@@ -8,6 +8,7 @@ from recorder.catalogue.voice_notes import StoredVoice
 from rig.api.looking import VOICES_MAX, Note, VoiceNote
 from rig.errors import StateForbidsError, UnknownRecordingError
 from rig.host.files import open_to_read
+from rig.phrase import phrase
 from service.seam.archive import Download
 
 #: How the names of fields with notes begin.
@@ -37,7 +38,13 @@ def noted(session: Mapping[str, str], pulse: int, text: str) -> dict[str, str]:
     name = f"{NOTE_FIELD}{pulse}"
     fields = {field for field in session if field.startswith(NOTE_FIELD)}
     if text and name not in fields and (len(notes_of(session)) >= _NOTES_MAX or len(fields) >= _FIELDS_MAX):
-        raise StateForbidsError(f"a recording has at most {_NOTES_MAX} notes: remove some, or use its field for notes")
+        raise StateForbidsError(
+            phrase(
+                "notes_full",
+                "a recording has at most {most} notes: remove some, or use its field for notes",
+                most=_NOTES_MAX,
+            )
+        )
     return {name: text} if text or name in fields else {}
 
 
@@ -58,7 +65,9 @@ def check_voices(stored: Sequence[StoredVoice]) -> None:
         StateForbidsError: there are too many.
     """
     if len(stored) >= VOICES_MAX:
-        raise StateForbidsError(f"a recording has at most {VOICES_MAX} spoken notes: remove some")
+        raise StateForbidsError(
+            phrase("voice_notes_full", "a recording has at most {most} spoken notes: remove some", most=VOICES_MAX)
+        )
 
 
 def voice_file(stored: Iterable[StoredVoice], number: int, name: str) -> Download:
@@ -74,7 +83,13 @@ def voice_file(stored: Iterable[StoredVoice], number: int, name: str) -> Downloa
     """
     note = next((each for each in stored if each.number == number), None)
     if note is None:
-        raise UnknownRecordingError(f"the recording has no spoken note {number}: see the list of its notes")
+        raise UnknownRecordingError(
+            phrase(
+                "voice_note_unknown",
+                "the recording has no spoken note {number}: see the list of its notes",
+                number=number,
+            )
+        )
     file, path = f"{name}_note-{number}_pulse-{note.pulse}.webm", note.path
     tag = f"{note.recorded}-{note.bytes}-{number}"
     return Download(file, note.bytes, note.recorded, tag, corrected=False, open=lambda: open_to_read(path, links=False))

@@ -56,7 +56,7 @@ class TrainControl:
         """
         self._check()
         if not self.still:
-            raise StateForbidsError("the pulses run: stop them, then ask for a number of pulses")
+            raise StateForbidsError(phrase("pulses_run", "the pulses run: stop them, then ask for a number of pulses"))
         self._let(pulses)
         said = phrase("event_burst", "is to make {pulses} pulses", pulses=pulses)
         self._session.tell(Event.now(Level.INFO, TRIGGER, said))

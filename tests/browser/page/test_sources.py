@@ -282,6 +282,16 @@ def test_findings_events_and_reasons_are_said_in_norwegian_too_with_the_values_t
     assert set().union(*listed) == heard
 
 
+def test_what_the_state_forbids_is_a_sentence_that_the_page_can_translate() -> None:
+    """The kind of refusal alone would only say in Norwegian that it is not possible now."""
+    plain = []
+    for path in (ROOT / "service").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "StateForbidsError":
+                plain += [(path.name, node.lineno)] * isinstance(node.args[0], ast.Constant | ast.JoinedStr)
+    assert not plain
+
+
 def _listed(name: str) -> set[str]:
     return set(re.findall(r"^  (\w+): \[", (PAGE / "i18n" / name).read_text(), re.MULTILINE))
 

@@ -31,6 +31,7 @@ def test_twenty_pulses_in_the_air_take_less_than_sixty_clicks(tmp_path: Path) ->
     for direction, most in ((1, PULSES[-1] - START), (-1, START - ON_TABLE[0])):
         followed(desk, "Anna", TrackOrder(things=THINGS, pulse=START, direction=direction, most=most))
     _states_stand(desk)
+    _each_point_says_how_sure_it_is(desk)
     points, skis = _errors(desk, log, PULSES)
     assert sum(map(len, points.values())) >= 0.95 * 4 * len(PULSES)
     assert sum(map(len, skis.values())) >= 0.9 * 2 * len(PULSES)
@@ -41,6 +42,16 @@ def test_twenty_pulses_in_the_air_take_less_than_sixty_clicks(tmp_path: Path) ->
     for kind in (points, on_table, skis, its_skis):
         assert all(np.abs(errors).max() < 5 for errors in kind.values())
     desk.close()
+
+
+def _each_point_says_how_sure_it_is(desk: Desk) -> None:
+    """A point in space is controlled by a third ray, or says that it is not; without a place it says why."""
+    for pulse in PULSES:
+        for name, point in desk.view("Anna", pulse).space.items():
+            if point.X is not None:
+                assert point.status == {2: "two rays", 3: "controlled"}[len(point.rays)], (pulse, name)
+            else:
+                assert point.status not in {"", "two rays", "controlled"}, (pulse, name)
 
 
 def _errors(desk: Desk, log: HillLog, pulses: range) -> tuple[dict[str, list[Floats]], dict[str, list[float]]]:

@@ -107,9 +107,9 @@ def _picture(recording: Recording, shot: Shot, order: ExportOrder) -> Stored:
         return picture
     picture = picture.copy()
     if named:
-        write_lacking(picture, shot, columns)
+        write_lacking(picture, shot, columns, order.language)
     if order.burn_in:
-        write_caption(picture, caption(shot, recording.session))
+        write_caption(picture, caption(shot, recording.session, order.language))
     return picture
 
 

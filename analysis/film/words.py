@@ -8,8 +8,10 @@ from typing import Final
 import cv2
 import numpy as np
 
-from analysis.film.shots import Shot
+from analysis.film.shots import UNKNOWN, Shot
+from rig.api.language import Language
 from rig.clocks import NS_PER_S
+from rig.frame import FrameStatus
 from rig.images.pixels import Stored
 
 FONT: Final = cv2.FONT_HERSHEY_DUPLEX
@@ -18,17 +20,27 @@ _WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 _PART, _LEAST, _MOST = 1 / 18, 0.3, 2.0
 _LETTER_PX: Final = 22
 _BIB_MAX: Final = 20
+_WORDS: Final[dict[Language, dict[str, str]]] = {
+    Language.EN: {"bib": "bib", "pulse": "pulse"},
+    Language.NB: {
+        "bib": "startnr.", "pulse": "puls", UNKNOWN: "mangler", FrameStatus.LOST: "tapt",
+        FrameStatus.MISSED: "ikke sett", FrameStatus.DAMAGED: "skadet", FrameStatus.ABSENT: "borte",
+    },
+}  # fmt: skip
 #: Letters that have no accent that could be taken off.
 _PLAIN: Final = str.maketrans({"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "ß": "ss", "ł": "l", "Ł": "L"})
 
 
-def caption(shot: Shot, session: Mapping[str, str]) -> str:
+def caption(shot: Shot, session: Mapping[str, str], language: Language) -> str:
     """Bib, pulse and time of day of a pulse; the font has no signs beyond ASCII."""
+    words = _WORDS[language]
     bib = session.get("bib", "").strip()[:_BIB_MAX]
     plain = unicodedata.normalize("NFKD", bib.translate(_PLAIN)).encode("ascii", "ignore").decode()
     clock = datetime.fromtimestamp(shot.time // NS_PER_S, UTC).strftime("%H:%M:%S")
     thousandths = shot.time % NS_PER_S // 1_000_000
-    return (f"bib {plain}  " if plain else "") + f"pulse {shot.pulse}  {clock}.{thousandths:03d} UTC"
+    return (
+        f"{words['bib']} {plain}  " if plain else ""
+    ) + f"{words['pulse']} {shot.pulse}  {clock}.{thousandths:03d} UTC"
 
 
 def write_caption(picture: Stored, text: str) -> None:
@@ -37,9 +49,10 @@ def write_caption(picture: Stored, text: str) -> None:
     write_outlined(picture, text, (round(8 * size), picture.shape[0] - round(12 * size)), size)
 
 
-def write_lacking(picture: Stored, shot: Shot, columns: tuple[tuple[int, int], ...]) -> None:
+def write_lacking(picture: Stored, shot: Shot, columns: tuple[tuple[int, int], ...], language: Language) -> None:
     """Write into each black block why there is no frame, in place."""
-    for place, word in shot.lacking.items():
+    for place, why in shot.lacking.items():
+        word = _WORDS[language].get(why, why)
         block = picture[:, slice(*columns[place])]
         size = _size(block, word)
         (wide, high), _ = cv2.getTextSize(word, FONT, size, 1)

@@ -1,18 +1,10 @@
 """Comparisons of measured jumps in the form of the REST API."""
 
 from datetime import datetime
-from enum import StrEnum
 
 from pydantic import Field
 
 from rig.api.fields import Model
-
-
-class PageLanguage(StrEnum):
-    """Language that a page shows first."""
-
-    EN = "en"
-    NB = "nb"
 
 
 class Span(Model):

@@ -9,6 +9,7 @@ from typing import Annotated, Final
 from pydantic import Field
 
 from rig.api.fields import WHOLE, Model
+from rig.api.language import Language
 from rig.phrase import Phrase
 
 _CAMERAS_MAX: Final = 8
@@ -54,6 +55,7 @@ class ExportOrder(Model):
     slow: float = Field(1.0, ge=1, le=10, description="so many times slower, for videos")
     quality: Quality = Field(Quality.GOOD, description="of a video for people")
     burn_in: bool = Field(False, strict=True, description="write bib, pulse and time into the pictures of a video")
+    language: Language = Field(Language.EN, description="of words in the pictures of a video")
 
 
 class ExportState(StrEnum):

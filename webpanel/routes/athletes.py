@@ -7,8 +7,9 @@ from fastapi.responses import HTMLResponse
 from pydantic import TypeAdapter
 
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery
-from rig.api.comparison import Comparison, PageLanguage, Span
+from rig.api.comparison import Comparison, Span
 from rig.api.fields import LONGEST_LINE
+from rig.api.language import Language
 from rig.host.file_names import ID_PATTERN
 from service.seam.rig import RigService
 from webpanel.routes.common import ALONE, Moment, compressed, refusals, strict_router
@@ -69,7 +70,7 @@ def athletes_router(service: RigService) -> APIRouter:
         second: Annotated[str, Query(pattern=f"^{ID_PATTERN}$", description="id of a recording, or the same")],
         first_jump: Annotated[int, Query(ge=1, le=100_000, description="number of its jump")] = 1,
         second_jump: Annotated[int, Query(ge=1, le=100_000, description="number of its jump")] = 1,
-        language: Annotated[PageLanguage, Query(description="that the page shows first")] = PageLanguage.EN,
+        language: Annotated[Language, Query(description="that the page shows first")] = Language.EN,
     ) -> HTMLResponse:
         """A page that compares two measured jumps, as that of `svev compare`: names, what differs, pictures, curves.
 

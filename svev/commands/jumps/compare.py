@@ -16,7 +16,7 @@ from analysis.report.compared.page import comparison_page
 from analysis.report.compared.places import Images, images_beside
 from analysis.result.file import read
 from analysis.result.model import MeasuredRecording
-from rig.api.comparison import PageLanguage
+from rig.api.language import Language
 from rig.errors import BadInputError
 from svev import console
 from svev.overwriting import ForceOption, refuse_existing
@@ -37,11 +37,11 @@ def compare(
         typer.Option("--also", metavar="DIR", help="further jumps, for the athlete's own scatter; may be repeated"),
     ] = None,
     language: Annotated[
-        PageLanguage,
+        Language,
         typer.Option(
             "--language", metavar="en|nb", help="that the page shows first; a reader can choose the other one"
         ),
-    ] = PageLanguage.EN,
+    ] = Language.EN,
     force: ForceOption = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="end with one JSON object: the result without series")
@@ -67,7 +67,7 @@ def compare(
     comparison = Comparison(alignment, found, scatter(alignment.jumps[2:], found.times))
     result = to_json(comparison)
     page = comparison_page(
-        comparison, (_images(dir_a, a), _images(dir_b, b)), "nb" if language is PageLanguage.NB else "en"
+        comparison, (_images(dir_a, a), _images(dir_b, b)), "nb" if language is Language.NB else "en"
     )
     out.mkdir(parents=True, exist_ok=True)
     written = json.dumps(result, allow_nan=False, ensure_ascii=False) + "\n"

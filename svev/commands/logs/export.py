@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from analysis.film.export import export, in_file_name
 from analysis.film.shots import Recording
 from rig.api.export import ENDINGS, ExportOrder, Kind, Quality
+from rig.api.language import Language
 from rig.errors import BadInputError
 from svev import console
 from svev.commands.logs.contents import AlsoJson, LogPath, check_pulses
@@ -53,6 +54,9 @@ def export_command(
     burn_in: Annotated[
         bool, typer.Option("--burn-in", help="write bib, pulse and time into the pictures (videos)")
     ] = False,
+    language: Annotated[
+        Language, typer.Option("--language", metavar="en|nb", help="of words in the pictures (videos)")
+    ] = Language.EN,
     images: Annotated[
         Images, typer.Option("--images", metavar="png|tiff", help="format of pictures in a folder")
     ] = Images.PNG,
@@ -79,7 +83,14 @@ def export_command(
         raise BadInputError(f"{out}: --separate, --burn-in and --slow are for videos: name a .mp4 or .mkv")
     try:
         order = ExportOrder(
-            kind=kind, cameras=tuple(camera or ()), first=first, last=last, slow=slow, quality=quality, burn_in=burn_in
+            kind=kind,
+            cameras=tuple(camera or ()),
+            first=first,
+            last=last,
+            slow=slow,
+            quality=quality,
+            burn_in=burn_in,
+            language=language,
         )
     except ValidationError as error:
         raise BadInputError(f"{error.errors()[0]['loc'][0]}: {error.errors()[0]['msg']}; see --help") from None

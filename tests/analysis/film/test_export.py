@@ -20,6 +20,7 @@ from recorder.reading.items import Chunk
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
 from rig.api.export import ExportOrder, Kind, Quality
+from rig.api.language import Language
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from svev.cli import main
@@ -116,6 +117,10 @@ def test_words_are_burnt_in_and_missing_frames_say_why(gap: Path, tmp_path: Path
         assert without[pulse - 1, 45:75].max() > 180
     assert np.abs(without[4] - without[7]).max() > 100  # "missing" and "lost"
     np.testing.assert_allclose(without[4], without[5], atol=20)
+    export(gap, ExportOrder(cameras=("K2",), quality=Quality.BEST, language=Language.NB), plain)
+    norwegian = np.array([picture for _, picture in _decoded(plain)], float)
+    for pulse in (5, 8):  # "mangler" and "tapt"
+        assert np.abs(norwegian[pulse - 1] - without[pulse - 1]).max() > 100
 
 
 def test_worse_quality_is_smaller(gap: Path, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 /** Exports of the recording shown: ask for a video, pictures or a table, see how far it is, fetch it. */
 
-import { say, t } from "../i18n/i18n.js";
+import { languageInUse, say, t } from "../i18n/i18n.js";
 import { call, recordingPath } from "../shared/api.js";
 import { $, icon, make } from "../shared/dom.js";
 import { number, size } from "../shared/format.js";
@@ -82,6 +82,7 @@ async function ask() {
   const order = {
     kind, cameras: camera && kind !== "contact_sheet" ? [camera] : [], ...marked(), quality: $("export-quality").value,
     slow: VIDEOS.includes(kind) ? Number($("export-slow").value) : 1, burn_in: VIDEOS.includes(kind) && $("export-burn").checked,
+    language: languageInUse(),
   };
   await attempt(async () => {
     await call("POST", recordingPath(recording, "/exports"), order);

@@ -1,0 +1,10 @@
+"""The languages that pages and pictures for people speak."""
+
+from enum import StrEnum
+
+
+class Language(StrEnum):
+    """One of them."""
+
+    EN = "en"
+    NB = "nb"

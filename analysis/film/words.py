@@ -38,9 +38,8 @@ def caption(shot: Shot, session: Mapping[str, str], language: Language) -> str:
     plain = unicodedata.normalize("NFKD", bib.translate(_PLAIN)).encode("ascii", "ignore").decode()
     clock = datetime.fromtimestamp(shot.time // NS_PER_S, UTC).strftime("%H:%M:%S")
     thousandths = shot.time % NS_PER_S // 1_000_000
-    return (
-        f"{words['bib']} {plain}  " if plain else ""
-    ) + f"{words['pulse']} {shot.pulse}  {clock}.{thousandths:03d} UTC"
+    whose = f"{words['bib']} {plain}  " if plain else ""
+    return f"{whose}{words['pulse']} {shot.pulse}  {clock}.{thousandths:03d} UTC"
 
 
 def write_caption(picture: Stored, text: str) -> None:

@@ -103,6 +103,7 @@ def browser() -> Iterator[Browser | None]:
     if program is None:
         yield None
         return
+    # Its helpers write there until they notice that it has ended.
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         theirs, commands, answers, ours = _pipes()
         arguments = [f"--user-data-dir={profile}", "--remote-debugging-pipe", "--disable-gpu", "about:blank"]

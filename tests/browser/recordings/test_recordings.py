@@ -348,7 +348,9 @@ def test_a_jump_shows_what_the_start_list_had_and_where_it_goes_on(
     write_recording(folder, "one-part2", (ALL_OK,) * 3, session | {"continues": "one", "continues_after": "3"})
     page = open_page(f"{panel.url}/#/recordings/one", locale="nb-NO")
     facts = page.locator("#recording-facts")
-    expect(facts).to_have_text(re.compile("Omgang2KlubbLynklasseJ18.*Navnone.*Fortsetter ione-part2$"))
+    expect(facts).to_have_text(
+        re.compile("Omgang2KlubbLynklasseJ18.*Lengde0,1\u202fs.*Navnone.*Fortsetter ione-part2$")
+    )
     page.goto(f"{panel.url}/#/recordings/one-part2")
     expect(facts).to_have_text(re.compile("Navnone-part2.*Fortsetterone$"))
 

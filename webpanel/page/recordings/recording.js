@@ -5,7 +5,7 @@ import { call, partOf, Problem, recordingPath } from "../shared/api.js";
 import { hear } from "../shared/connection.js";
 import { $, fillList, icon, make, makeMark, setText } from "../shared/dom.js";
 import { makeFields, writeFields } from "../shared/fields.js";
-import { clock, day, number, size, timeOfDay, who } from "../shared/format.js";
+import { day, length, number, size, timeOfDay, who } from "../shared/format.js";
 import { go, place } from "../shared/router.js";
 import { attempt, clearSnacks, tell } from "../shared/snacks.js";
 import { offer } from "../viewing/comparing.js";
@@ -188,7 +188,7 @@ function drawFacts({ id, started, duration_s, bytes, counts, more, continues, co
   fillList($("recording-facts"), [
     ...listed,
     [t("recording.started"), started ? `${day(started)}, ${timeOfDay(started)}` : "–"],
-    [t("recording.duration"), clock(duration_s)],
+    [t("recording.duration"), length(duration_s)],
     [t("recording.pulses"), t("recording.complete_of", { complete: number(counts.complete), pulses: number(counts.pulses) })],
     [t("recording.causes"), causes.join(", ") || t("recording.no_causes")],
     [t("recording.size"), size(bytes)],

@@ -3,7 +3,7 @@
 import { say, t } from "../i18n/i18n.js";
 import { partOf } from "../shared/api.js";
 import { icon, make, makeMark } from "../shared/dom.js";
-import { clock, size, timeOfDay, who } from "../shared/format.js";
+import { length, size, timeOfDay, who } from "../shared/format.js";
 
 /** @typedef {import("../shared/types.js").Recording} Recording */
 
@@ -16,7 +16,7 @@ export function makeLink(recording) {
   const { id, session, started, duration_s, bytes, verdict, state, favourite, tags } = recording;
   const thumbnail = make("img", { class: "thumbnail", loading: "lazy", alt: "", width: 160, height: 90, src: partOf(id, "thumbnail.jpg") });
   thumbnail.addEventListener("error", () => thumbnail.classList.add("none"));
-  const facts = [started ? timeOfDay(started) : id, clock(duration_s), size(bytes)].join("  ·  ");
+  const facts = [started ? timeOfDay(started) : id, length(duration_s), size(bytes)].join("  ·  ");
   return make("a", { class: "summary", href: `#/recordings/${encodeURIComponent(id)}` },
     thumbnail,
     make("span", { class: "summary-words" },

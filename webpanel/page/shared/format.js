@@ -52,6 +52,15 @@ export function clock(seconds) {
   return hours ? `${hours}:${String(minutes).padStart(2, "0")}:${rest}` : `${minutes}:${rest}`;
 }
 
+/**
+ * How long a recording lasts: one of a jump alone is over within seconds.
+ *
+ * @param {number} seconds
+ */
+export function length(seconds) {
+  return seconds < 10 ? quantity(seconds, 1, "s") : clock(seconds);
+}
+
 /** @param {number} bytes */
 export function size(bytes) {
   return bytes < 1e9 ? quantity(bytes / 1e6, 0, "MB") : quantity(bytes / 1e9, 1, "GB");

@@ -8,44 +8,18 @@ with unknown q, directions of the normals n1 and n2, contrast a, background b wi
 symmetric about q, so that blur and perspective do not shift it. Least squares give q and, by the residuals, its sigma.
 """
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from rig.arrays import Flags, Floats
+from analysis.targets.fitting import FIRST_BLUR, Measured, fitted
+from rig.arrays import Floats
 
 #: Radii of the window (px): below, a window holds too few pixels for nine unknowns; above, edges need not be straight.
 SMALLEST: Final = 3
 LARGEST: Final = 9
-_STEPS: Final = 25
-_ENOUGH: Final = 1e-4  # px, of a step
-_FIRST_BLUR: Final = 1.0  # px
-_BLUR: Final = (0.3, 4.0)  # px, in which a window shows edges at all
-_UNKNOWNS: Final = 9
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Measured:
-    """n measured corners.
-
-    Attributes:
-        xy: (n, 2) px, pixel frame: x right, y down, (0, 0) the centre of the top left pixel.
-        cofactor: (n, 2) variance of x and y for grey values of variance 1.
-        noise: (n,) rms of the grey values' residuals.
-        contrast: (n,) half the difference of white and black, signed as the start directions ask for.
-        blur: (n,) width s (px).
-        good: (n,) whether the fit converged within its window.
-    """
-
-    xy: Floats
-    cofactor: Floats
-    noise: Floats
-    contrast: Floats
-    blur: Floats
-    good: Flags
 
 
 def measure_corners(grey: NDArray[np.float32], start: Floats, edges: Floats, radius: int) -> Measured:
@@ -72,38 +46,17 @@ def measure_corners(grey: NDArray[np.float32], start: Floats, edges: Floats, rad
     angle = _inwards(angle, edges)
     unknowns = np.column_stack(
         (start - middle, angle, (high - low) / 2, (high + low) / 2, np.zeros((len(start), 2)),
-         np.full(len(start), np.log(_FIRST_BLUR)))
+         np.full(len(start), np.log(FIRST_BLUR)))
     )  # fmt: skip
-    damping = np.full(len(start), 1e-3)
-    residual, slopes = _linearised(unknowns, values, dx, dy)
-    cost = np.einsum("np,np->n", residual, residual)
-    step = np.zeros_like(unknowns)
-    for _ in range(_STEPS):
-        normal = np.einsum("npi,npj->nij", slopes, slopes)
-        diagonal = np.einsum("nii->ni", normal)
-        damped = normal + (damping[:, None] * diagonal + 1e-9)[..., None] * np.eye(_UNKNOWNS)
-        step = -np.linalg.solve(damped, np.einsum("npi,np->ni", slopes, residual)[..., None])[..., 0]
-        tried = unknowns + step
-        tried[:, 8] = np.clip(tried[:, 8], *np.log(_BLUR))
-        next_residual, next_slopes = _linearised(tried, values, dx, dy)
-        next_cost = np.einsum("np,np->n", next_residual, next_residual)
-        better = next_cost <= cost
-        unknowns[better], residual[better], slopes[better] = tried[better], next_residual[better], next_slopes[better]
-        cost = np.where(better, next_cost, cost)
-        damping = np.where(better, damping / 5.0, np.minimum(damping * 5.0, 1e6))
-        if np.all(np.abs(step[:, :2]).max(axis=1) < _ENOUGH):
-            break
-    normal = np.einsum("npi,npj->nij", slopes, slopes)
-    cofactor = np.linalg.pinv(normal, hermitian=True)
-    moved = np.linalg.norm(unknowns[:, :2] - (start - middle), axis=1)
-    settled = np.abs(step[:, :2]).max(axis=1, initial=0.0) < 10.0 * _ENOUGH
+    fit = fitted(unknowns, lambda tried: _linearised(tried, values, dx, dy))
+    moved = np.linalg.norm(fit.unknowns[:, :2] - (start - middle), axis=1)
     return Measured(
-        middle + unknowns[:, :2],
-        np.stack((cofactor[:, 0, 0], cofactor[:, 1, 1]), axis=1),
-        np.sqrt(cost / (len(dx) - _UNKNOWNS)),
-        unknowns[:, 4],
-        np.exp(unknowns[:, 8]),
-        fits & settled & (moved < radius / 2.0),
+        middle + fit.unknowns[:, :2],
+        fit.cofactor,
+        np.sqrt(fit.cost / (len(dx) - unknowns.shape[1])),
+        fit.unknowns[:, 4],
+        np.exp(fit.unknowns[:, -1]),
+        fits & fit.settled & (moved < radius / 2.0),
     )
 
 

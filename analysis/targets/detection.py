@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.targets.circles import measure_circles
 from analysis.targets.corners import LARGEST, SMALLEST, measure_corners
-from analysis.targets.pattern import CORNERS, DICTIONARY, MARKER, Layout
+from analysis.targets.pattern import CORNERS, DICTIONARY, FIRST_CIRCLES, MARKER, Layout
 from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.images.picture import Grey
@@ -26,7 +27,7 @@ _UNSURE: Final = 0.25  # px
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """A measured corner: place (px, pixel frame) and sigmas (px)."""
+    """A measured corner, or centre of a circle: place (px, pixel frame) and sigmas (px)."""
 
     x: float
     y: float
@@ -74,8 +75,10 @@ def find_targets(image: Grey, layout: Layout, name: str) -> Sight:
     targets = {code: _square(quad) for code, quad in found if times[code] == 1}
     if not found:
         return Sight(size, {}, {}, (), bool(_markers(np.ascontiguousarray(eight[:, ::-1]), layout)), np.nan)
-    wanted = _wanted(targets, layout, name)
-    corners, blur = _measured(np.asarray(image, np.float32), wanted)
+    squares = {code: square for code, square in targets.items() if code < FIRST_CIRCLES}
+    circles = {code: square for code, square in targets.items() if code >= FIRST_CIRCLES}
+    grey = np.asarray(image, np.float32)
+    corners, blur = _measured(grey, _wanted(squares, layout, name), circles, layout)
     return Sight(size, corners, targets, doubled, mirrored=False, blur=blur)
 
 
@@ -137,8 +140,10 @@ def _wanted(targets: Mapping[int, Floats], layout: Layout, name: str) -> dict[st
     return wanted
 
 
-def _measured(grey: NDArray[np.float32], wanted: Mapping[str, _Wanted]) -> tuple[dict[str, Corner], float]:
-    """Corners that are measured well, and the median width of their edges."""
+def _measured(
+    grey: NDArray[np.float32], wanted: Mapping[str, _Wanted], circles: Mapping[int, Floats], layout: Layout
+) -> tuple[dict[str, Corner], float]:
+    """Corners and centres of circles that are measured well, and the median width of their edges."""
     radii = {name: int(min(_WINDOW * each.length, LARGEST)) for name, each in wanted.items()}
     names: list[str] = []
     fits = []
@@ -148,6 +153,9 @@ def _measured(grey: NDArray[np.float32], wanted: Mapping[str, _Wanted]) -> tuple
         edges = np.array([wanted[name].edges for name in some])
         fits.append(measure_corners(grey, place, edges, radius))
         names += some
+    if circles:
+        fits.append(measure_circles(grey, np.array(list(circles.values()))))
+        names += [str(corner) for code in circles for corner in layout.corners(code)]
     if not names:
         return {}, np.nan
     xy, cofactor, noise, contrast, blur, good = (

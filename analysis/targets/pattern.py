@@ -2,7 +2,8 @@
 
 A coded target is a white square with a marker of OpenCV's ArUco dictionary in its middle and black fields at its four
 sides. Each corner of the white square is a point where two black and two white fields meet; those corners are measured,
-for they keep their place under blur. A ChArUco board is a grid of such targets that share corners.
+for they keep their place under blur. A ChArUco board is a grid of such targets that share corners. A target with
+circles has a black disc about each of the four corners instead of the fields; its corners are the discs' centres.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,11 @@ from rig.errors import BadInputError
 DICTIONARY: Final = cv2.aruco.DICT_5X5_250
 #: Codes from here on are single targets, those below are a board's.
 FIRST_SINGLE: Final = 100
+#: Single targets from here on have circles.
+FIRST_CIRCLES: Final = 175
 LAST_SINGLE: Final = 249
+#: So many single targets there are of each kind.
+MOST_SINGLE: Final = LAST_SINGLE - FIRST_CIRCLES + 1
 #: Side of the marker in units of the white square's side.
 MARKER: Final = 7.0 / 12.0
 #: Fields along a marker's side, its black border included.
@@ -28,6 +33,8 @@ FIELDS: Final = 7
 #: Depth of the black squares at a single target's sides, and half the side of what is cut out, in units of its side.
 BAR: Final = 7.0 / 24.0
 CUT: Final = 20.0 / 24.0
+#: Radius of a disc in units of its target's side: the marker's corner is 2.4 radii from its centre, the cut 2.7.
+DISC: Final = 1.0 / 8.0
 #: Corners of a target in units of its side, in the order of OpenCV: clockwise from the top left; y points down.
 CORNERS: Final[Floats] = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 _LETTERS: Final = "abcd"

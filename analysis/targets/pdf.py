@@ -1,4 +1,4 @@
-"""Writes PDF pages of black rectangles, lines and words at exact places: all that a printed target needs.
+"""Writes PDF pages of black rectangles, discs, lines and words at exact places: all that a printed target needs.
 
 Places are millimetres from the page's top left corner. PDF counts points (1/72 inch) from the bottom left.
 """
@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Final
 
 _POINT_MM: Final = 25.4 / 72.0
+#: How far a quarter circle's control points are from its ends, in radii.
+_QUARTER: Final = 4.0 / 3.0 * (2.0**0.5 - 1.0)
 #: Viewers are asked not to shrink pages to the printer's margins.
 _CATALOG: Final = "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>"
 _FONT: Final = "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>"
@@ -22,6 +24,19 @@ class Page:
     def box(self, x: float, y: float, width: float, height: float) -> None:
         """A black rectangle; x, y of its top left corner."""
         self._parts.append(f"{self._at(x, y + height)} {_points(width)} {_points(height)} re f")
+
+    def disc(self, x: float, y: float, radius: float) -> None:
+        """A black disc about x, y: four Bezier curves, which are off by 0.03 % of the radius at most."""
+        bow = _QUARTER * radius
+        curves = [f"{self._at(x + radius, y)} m"]
+        for i, k in ((1, 0), (0, 1), (-1, 0), (0, -1)):  # the quarter from direction (i, k) to (-k, i)
+            places = (
+                (x + i * radius - k * bow, y + k * radius + i * bow),
+                (x - k * radius + i * bow, y + i * radius + k * bow),
+                (x - k * radius, y + i * radius),
+            )
+            curves.append(" ".join(self._at(*place) for place in places) + " c")
+        self._parts.append(" ".join((*curves, "f")))
 
     def line(self, x: float, y: float, to_x: float, to_y: float, width: float = 0.2) -> None:
         """A line."""

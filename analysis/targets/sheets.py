@@ -3,7 +3,20 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
-from analysis.targets.pattern import BAR, CUT, FIELDS, FIRST_SINGLE, LAST_SINGLE, MARKER, Layout, marker
+from analysis.targets.pattern import (
+    BAR,
+    CORNERS,
+    CUT,
+    DISC,
+    FIELDS,
+    FIRST_CIRCLES,
+    FIRST_SINGLE,
+    LAST_SINGLE,
+    MARKER,
+    MOST_SINGLE,
+    Layout,
+    marker,
+)
 from analysis.targets.pdf import Page
 from rig.errors import BadInputError
 
@@ -58,7 +71,7 @@ def target_pages(layout: Layout, codes: Sequence[int]) -> list[Page]:
         BadInputError: there are not so many codes.
     """
     if not codes or min(codes) < FIRST_SINGLE or max(codes) > LAST_SINGLE:
-        raise BadInputError(f"there are 1 to {LAST_SINGLE - FIRST_SINGLE + 1} single targets; ask for so many")
+        raise BadInputError(f"there are 1 to {MOST_SINGLE} single targets of a kind; ask for so many")
     side = 2.0 * CUT * layout.single_mm
     inside = _page(side, side)
     columns = max(1, int((inside.width - 2.0 * _MARGIN) // side))
@@ -71,7 +84,8 @@ def target_pages(layout: Layout, codes: Sequence[int]) -> list[Page]:
         for i, code in enumerate(some):
             row, column = divmod(i, columns)
             _single(page, code, left + (column + 0.5) * side, top + (row + 0.5) * side, layout.single_mm)
-        _foot(page, f"targets, white squares {layout.single_mm:g} mm, DICT_5X5_250")
+        round_ones = f" with circles, {2.0 * DISC * layout.single_mm:g} mm wide" if some[0] >= FIRST_CIRCLES else ""
+        _foot(page, f"targets{round_ones}, white squares {layout.single_mm:g} mm, DICT_5X5_250")
         pages.append(page)
     return pages
 
@@ -100,10 +114,14 @@ def _marker(code: int, x: float, y: float, side: float) -> Iterator[_Box]:
 
 def _single(page: Page, code: int, x: float, y: float, side: float) -> None:
     half, depth, cut = side / 2.0, side * BAR, side * CUT
-    page.box(x - half, y - half - depth, side, depth)
-    page.box(x - half, y + half, side, depth)
-    page.box(x - half - depth, y - half, depth, side)
-    page.box(x + half, y - half, depth, side)
+    if code >= FIRST_CIRCLES:
+        for across, down in CORNERS:
+            page.disc(x + across * side, y + down * side, DISC * side)
+    else:
+        page.box(x - half, y - half - depth, side, depth)
+        page.box(x - half, y + half, side, depth)
+        page.box(x - half - depth, y - half, depth, side)
+        page.box(x + half, y - half, depth, side)
     for box in _marker(code, x, y, side):
         page.box(*box)
     page.text(x - cut + 0.02 * side, y + cut - 0.03 * side, f"{code}", 0.05 * side)

@@ -78,6 +78,16 @@ def test_pictures_of_any_format_and_depth_give_the_same(tmp_path: Path, frame: l
     assert results == pytest.approx([results[0]] * 3, abs=1e-3)
 
 
+def test_circles_are_calibrated_by_as_corners_are_without_a_word(tmp_path: Path) -> None:
+    drawing = Drawing(_CAMERA, random=np.random.default_rng(2))
+    sheets = frame_sheets(target_mm=110.0, step=50.0, circles=True)
+    poses = stations(np.array([0.0, 0.0, -75.0]), 1600.0, np.random.default_rng(3), count=5)
+    folder = _written(tmp_path / "K1", [drawing.picture(sheets, *pose) for pose in poses])
+    assert _calibrate(folder, "-o", tmp_path / "out", "--target-mm", "110") == 0
+    assert read_calibration(tmp_path / "out" / "calibration.json")["K1"].c == pytest.approx(600.0, abs=0.5)
+    assert all(point.name >= "T175" for point in read_network(tmp_path / "out" / "network.json").points)
+
+
 def test_json_ends_with_the_verdict(
     tmp_path: Path, frame: list[NDArray[np.uint8]], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -150,8 +160,9 @@ def test_targets_are_printed_as_asked(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main(["target", "-o", str(tmp_path / "print"), "--targets", "3"]) == 0
     said = capsys.readouterr().out
     assert "targets.pdf: 2 pages" in said
+    assert "circles.pdf: 2 pages" in said
     assert "print at 100 %" in said
-    for name in ("board.pdf", "targets.pdf"):
+    for name in ("board.pdf", "targets.pdf", "circles.pdf"):
         assert (tmp_path / "print" / name).read_bytes().startswith(b"%PDF-1.4")
     assert main(["target", "-o", str(tmp_path), "--board", "40x30"]) == 2
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.targets.pattern import FIRST_SINGLE, LAST_SINGLE, Layout
+from analysis.targets.pattern import FIRST_CIRCLES, FIRST_SINGLE, MOST_SINGLE, Layout
 from analysis.targets.pdf import pdf
 from analysis.targets.sheets import board_geometry, board_page, target_pages
 from svev import console
@@ -21,21 +21,24 @@ _PRINT = (
 
 def target(
     out: Annotated[
-        Path, typer.Option("-o", "--out", metavar="DIR", help="folder for board.pdf, board.json and targets.pdf")
+        Path,
+        typer.Option(
+            "-o", "--out", metavar="DIR", help="folder for board.pdf, board.json, targets.pdf and circles.pdf"
+        ),
     ],
     board: BoardOption = "9x6",
     square_mm: SquareOption = 30.0,
     target_mm: TargetOption = 80.0,
     targets: Annotated[
         int,
-        typer.Option(
-            "--targets", metavar="N", min=1, max=LAST_SINGLE - FIRST_SINGLE + 1, help="how many single targets"
-        ),
+        typer.Option("--targets", metavar="N", min=1, max=MOST_SINGLE, help="how many single targets of each kind"),
     ] = 24,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make targets to print: a ChArUco board, and single coded targets for a frame in space, as PDF of exact size.
+    """Make targets to print, as PDF of exact size: a ChArUco board, and single coded targets for a frame in space.
+
+    Single targets are of two kinds: targets.pdf has corners to be measured, circles.pdf centres of circles.
 
     Exit codes: 0 done, 2 bad input.
 
@@ -44,7 +47,8 @@ def target(
     columns, rows = columns_and_rows(board)
     layout = Layout(columns, rows, square_mm, target_mm)
     files = {"board.pdf": [board_page(layout)]}
-    files["targets.pdf"] = target_pages(layout, range(FIRST_SINGLE, FIRST_SINGLE + targets))
+    for name, first in (("targets.pdf", FIRST_SINGLE), ("circles.pdf", FIRST_CIRCLES)):
+        files[name] = target_pages(layout, range(first, first + targets))
     geometry = out / "board.json"
     refuse_existing(*(out / name for name in files), geometry, force=force)
     out.mkdir(parents=True, exist_ok=True)

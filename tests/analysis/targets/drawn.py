@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 UNITS: Final = 24  # raster cells along a square: its marker begins after 5 of them, and each field has 2
 _DARK, _BRIGHT, _BEHIND = 30.0, 210.0, 120.0
 _FINE: Final = 4  # rays along a pixel's side
+_FINER: Final = 4  # raster cells of targets with circles for one of the others
 _STRIP: Final = 16  # rows of the fine grid that are computed at a time: their arrays stay in the processor's cache
 
 
@@ -68,6 +69,7 @@ class Sheet:
     Attributes:
         raster: (rows, columns), -1 where it has been cut away.
         cell: mm, side of a raster cell.
+        units: raster cells along a square.
         place: (3,) mm, of the middle.
         axes: (3, 3), columns: to the right, upwards, towards the reader.
     """
@@ -76,6 +78,7 @@ class Sheet:
     cell: float
     place: Array
     axes: Array
+    units: int = UNITS
 
 
 def board_raster(columns: int = 9, rows: int = 6) -> NDArray[np.float32]:
@@ -96,6 +99,22 @@ def single_raster(code: int) -> NDArray[np.float32]:
     fields = np.kron(cv2.aruco.generateImageMarker(dictionary, code, 7), np.ones((2, 2)))
     raster[13:27, 13:27] = np.where(fields > 127, _BRIGHT, _DARK)
     return raster
+
+
+def circles_raster(code: int) -> NDArray[np.float32]:
+    """A target with discs of an eighth of the square's side about its corners; four cells where the others have one."""
+    raster = np.kron(single_raster(code), np.ones((_FINER, _FINER), np.float32))
+    inside, size = slice(12 * _FINER, 28 * _FINER), 40 * _FINER
+    shades = np.full((size, size), _BRIGHT, np.float32)
+    shades[inside, inside] = raster[inside, inside]
+    parts = 8  # along a cell's side, of which each is within the disc or outside
+    fine = (np.arange(size * parts) + 0.5) / (_FINER * parts)
+    for row in (8.0, 32.0):
+        for column in (8.0, 32.0):
+            disc = ((fine - row) ** 2)[:, None] + ((fine - column) ** 2)[None] < (UNITS / 8.0) ** 2
+            share = disc.reshape(size, parts, size, parts).mean(axis=(1, 3))
+            shades += (share * (_DARK - _BRIGHT)).astype(np.float32)
+    return shades
 
 
 def looking(at: Array, away: float, *, along: float, up: float, roll: float) -> tuple[Array, Array]:
@@ -200,7 +219,9 @@ def board_sheet(square_mm: float = 30.0) -> Sheet:
     return Sheet(board_raster(), square_mm / UNITS, np.zeros(3), np.eye(3))
 
 
-def frame_sheets(count: int = 16, target_mm: float = 80.0, step: float = 150.0) -> list[Sheet]:
+def frame_sheets(
+    count: int = 16, target_mm: float = 80.0, step: float = 150.0, *, circles: bool = False
+) -> list[Sheet]:
     """A 3D frame: targets at four depths, `step` mm apart, turned a little, all seen from +Z."""
     sheets = []
     side = int(np.ceil(np.sqrt(count)))
@@ -211,7 +232,11 @@ def frame_sheets(count: int = 16, target_mm: float = 80.0, step: float = 150.0) 
         _, axes = looking(
             place, 1.0, along=random.uniform(-15, 15), up=random.uniform(-15, 15), roll=random.uniform(-20, 20)
         )
-        sheets.append(Sheet(single_raster(100 + n), target_mm / UNITS, place, axes))
+        if circles:
+            units = UNITS * _FINER
+            sheets.append(Sheet(circles_raster(175 + n), target_mm / units, place, axes, units))
+        else:
+            sheets.append(Sheet(single_raster(100 + n), target_mm / UNITS, place, axes))
     return sheets
 
 
@@ -229,7 +254,10 @@ def stations(at: Array, away: float, random: np.random.Generator, count: int = 1
 
 
 def corner_places(sheets: list[Sheet]) -> dict[str, Array]:
-    """Where the corners are, by the names that Svev gives them: a board alone, or single targets from 100 on."""
+    """Where the corners are, by the names that Svev gives them: a board alone, or single targets from 100 on.
+
+    Those with circles are from 175 on.
+    """
     if len(sheets) == 1:
         cell = sheets[0].cell * UNITS
         return {
@@ -237,9 +265,10 @@ def corner_places(sheets: list[Sheet]) -> dict[str, Array]:
         }
     places = {}
     for n, sheet in enumerate(sheets):
-        half = sheet.cell * UNITS / 2
+        half = sheet.cell * sheet.units / 2
+        first = 100 if sheet.units == UNITS else 175
         for letter, (u, v) in zip("abcd", ((-half, half), (half, half), (half, -half), (-half, -half)), strict=True):
-            places[f"T{100 + n}{letter}"] = sheet.place + sheet.axes[:, 0] * u + sheet.axes[:, 1] * v
+            places[f"T{first + n}{letter}"] = sheet.place + sheet.axes[:, 0] * u + sheet.axes[:, 1] * v
     return places
 
 

@@ -26,10 +26,34 @@ def _boxes(page: Page) -> NDArray[np.float64]:
     return boxes
 
 
+def _discs(page: Page) -> list[tuple[float, float, float]]:
+    """x, y of the centre and radius of the discs, mm; each must be a circle."""
+    found = []
+    for curves in re.findall(rb"^(.* m (?:.* c ){4}f)$", page.content(), re.MULTILINE):
+        places = np.array(re.findall(rb"[\d.]+ [\d.]+", curves)).tolist()
+        ends = np.array([place.split() for place in places[::3]], dtype=float) / _MM
+        bows = np.array([place.split() for place in places], dtype=float).reshape(-1, 2) / _MM
+        middle = (ends[0] + ends[2]) / 2.0
+        radius = float(np.linalg.norm(ends[0] - middle))
+        p = [bows[k : k + 4] - middle for k in range(0, 12, 3)]
+        share = np.linspace(0.0, 1.0, 21)[:, None]
+        for a, b, c, d in p:
+            curve = (
+                (1 - share) ** 3 * a + 3 * (1 - share) ** 2 * share * b + 3 * (1 - share) * share**2 * c + share**3 * d
+            )
+            assert np.allclose(np.linalg.norm(curve, axis=1), radius, rtol=3e-4)
+        found.append((float(middle[0]), float(page.height - middle[1]), radius))
+    return found
+
+
 def _printed(page: Page, per_mm: float) -> NDArray[np.uint8]:
     sheet = np.full((round(page.height * per_mm), round(page.width * per_mm)), 255, np.uint8)
     for x, y, width, height in np.rint(_boxes(page) * per_mm).astype(int).tolist():
         sheet[y : y + height, x : x + width] = 0
+    parts = 8  # of a pixel's side, as OpenCV counts them: 2^3
+    for x, y, radius in _discs(page):
+        middle = [round((place * per_mm - 0.5) * parts) for place in (x, y)]
+        cv2.circle(sheet, middle, round(radius * per_mm * parts), 0, cv2.FILLED, cv2.LINE_AA, 3)
     return sheet
 
 
@@ -61,7 +85,22 @@ def test_single_targets_are_found_with_their_codes() -> None:
     assert np.array_equal(drawn, single_raster(104)[1:39, 1:39] < 127)
 
 
-@pytest.mark.parametrize("page", [board_page(Layout()), *target_pages(Layout(), [100])])
+def test_targets_with_circles_are_found_and_measured() -> None:
+    layout, per_mm = Layout(), 3.6
+    (page,) = target_pages(layout, [175, 176])
+    assert [radius for _, _, radius in _discs(page)] == pytest.approx([10.0] * 8, abs=1e-4)
+    assert b"(targets with circles, 20 mm wide, white squares 80 mm" in page.content()
+    picture = np.asarray(cv2.GaussianBlur(_printed(page, per_mm), (0, 0), 0.8), np.uint8)
+    sight = find_targets(picture, layout, "page")
+    assert sorted(sight.targets) == [175, 176]
+    printed = np.array([(x * per_mm - 0.5, y * per_mm - 0.5) for x, y, _ in _discs(page)])
+    measured = np.array([(corner.x, corner.y) for corner in sight.corners.values()])
+    nearest = np.linalg.norm(measured[:, None] - printed, axis=2).argmin(axis=1)
+    assert sorted(nearest) == list(range(8))
+    assert np.allclose(measured, printed[nearest], atol=0.1)
+
+
+@pytest.mark.parametrize("page", [board_page(Layout()), *target_pages(Layout(), [100]), *target_pages(Layout(), [175])])
 def test_each_page_has_a_line_of_150_mm_to_measure(page: Page) -> None:
     ends = re.findall(rb"([\d.]+) ([\d.]+) m ([\d.]+) ([\d.]+) l S", page.content())
     lengths = [np.hypot(float(c) - float(a), float(d) - float(b)) / _MM for a, b, c, d in ends]

@@ -40,12 +40,12 @@ def _sheets(kind: str) -> tuple[list[Sheet], Array, float]:
     if kind == "board":
         return [board_sheet()], np.zeros(3), 270.0
     # near enough to be read, and so flat that no target hides another's square at 35 degrees
-    return frame_sheets(target_mm=_TARGET_MM, step=50.0), np.array([0.0, 0.0, -75.0]), 1250.0
+    return frame_sheets(target_mm=_TARGET_MM, step=50.0, circles=kind == "circles"), np.array([0.0, 0.0, -75.0]), 1250.0
 
 
 @pytest.mark.long
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("kind", ["board", "frame"])
+@pytest.mark.parametrize("kind", ["board", "frame", "circles"])
 def test_errors_of_calibrations_agree_with_their_sigmas(kind: str) -> None:
     random = np.random.default_rng(29)
     sheets, middle, away = _sheets(kind)
@@ -90,7 +90,7 @@ def _errors(camera: DrawnCamera, found: dict[str, tuple[float, float]], correlat
     return (*plain, (shift - camera.a1 * 240.0**3 - camera.a2 * 240.0**5) / sigma)
 
 
-@pytest.mark.parametrize("kind", ["board", "frame"])
+@pytest.mark.parametrize("kind", ["board", "frame", "circles"])
 def test_corners_are_measured_to_hundredths_of_a_pixel_and_their_sigmas_say_so(kind: str) -> None:
     random = np.random.default_rng(7)
     sheets, middle, away = _sheets(kind)

@@ -1,5 +1,6 @@
 """What a reader of the pages has in his folder beside a recording: films, targets, results, files of other programs."""
 
+import json
 import os
 import shutil
 from collections.abc import Callable
@@ -66,6 +67,10 @@ def write_files_of_others(folder: Path) -> None:
         matrix = np.array([[1420.0, 0.0, 325.5], [0.0, 1420.0, 231.25], [0.0, 0.0, 1.0]])
         write_opencv(folder / f"{name}.yml", matrix, lens)
     (folder / "balls.csv").write_text("name;X;Y;Z;sigma\nB1;0.523;-2.874;-1.871;0.012\nB2;1;2;3;0.02\n")
+    lens_of_one = dict.fromkeys(("x0", "y0", "a1", "a2", "a3", "b1", "b2", "c1", "c2", "r0"), 0.0)
+    camera = {"c": 1420.0, **lens_of_one, "distortion": "projected", "size": [640, 480]}
+    calibrated = {"format": "svev-adjustment/1", "converged": True, "cameras": {"K1": camera, "K2": camera}}
+    (folder / "calibration.json").write_text(json.dumps(calibrated))
     written = {path.suffix: path for path in write_aicon(folder)}
     written[".ior"].rename(folder / "cameras.ior")
     (folder / "export.txt").write_text(photomodeler_text(network))

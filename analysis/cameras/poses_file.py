@@ -16,10 +16,10 @@ from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from analysis.scene.survey import require_metres
 from photogrammetry.geometry.camera_model import INTERIOR, Distortion
 from photogrammetry.geometry.rotation import nearest_rotation
+from photogrammetry.network.calibration_file import read_calibration
 from photogrammetry.network.entries import Finite, Rotation, Triple
 from photogrammetry.network.model import Camera
 from photogrammetry.network.strict_text import read_json
-from photogrammetry.procedures.calibrated_cameras import read_calibration
 from photogrammetry.reports.result_file import POSE
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError

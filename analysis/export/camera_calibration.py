@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from photogrammetry.geometry.camera_model import INTERIOR, Lens, undistort
-from photogrammetry.procedures.calibrated_cameras import CalibratedCamera, read_calibration
+from photogrammetry.network.calibration_file import CalibratedCamera, read_calibration
 from rig.errors import BadInputError
 from rig.host.files import TEXT_MAX, read_whole
 from rig.settings.camera import CameraSettings

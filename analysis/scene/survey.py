@@ -139,8 +139,8 @@ def read_survey(path: Path) -> Survey:
     """Read a survey; interior parameters with a sigma are uncertain, and their uncertainty counts.
 
     Raises:
-        BadInputError: no network file but a table, observations in it, metric image frame, several images of a camera,
-            or fewer than four surveyed balls, or a unit that is not the metre.
+        BadInputError: no network file but a table, observations in it, metric image frame, no camera, several images of
+            one, or fewer than four surveyed balls, or a unit that is not the metre.
     """
     try:
         data = read_object(path, "survey")
@@ -151,7 +151,7 @@ def read_survey(path: Path) -> Survey:
             phrase(
                 "survey_table",
                 "{path}: is a table of points, and a survey holds the cameras too; make one of both: svev network "
-                "import K1.yml K2.yml K3.yml {path} -o survey.json",
+                "import calibration.json {path} -o survey.json",
                 path=str(path),
             )
         ) from None
@@ -186,6 +186,15 @@ def read_survey(path: Path) -> Survey:
                     camera=network.cameras[camera].name,
                 )
             )
+    if not network.cameras:
+        raise BadInputError(
+            phrase(
+                "survey_no_cameras",
+                "{path}: holds no camera; make a survey of calibration and balls: svev network import calibration.json "
+                "balls.csv -o survey.json",
+                path=str(path),
+            )
+        )
     count = sum(p.role in _SURVEYED for p in network.points)
     if count < _FEWEST:
         raise BadInputError(

@@ -1,4 +1,7 @@
-"""Carries files of other programs over into one network; which program wrote a file is seen by its name."""
+"""Carries files of other programs over into one network; which program wrote a file is seen by its name.
+
+The result of `svev calibrate` is taken too: with a survey it makes the survey file of an analysis.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,8 +15,10 @@ from photogrammetry.exchange.table import ENDINGS
 from photogrammetry.exchange.vision.camera_toml import read_camera_toml
 from photogrammetry.exchange.vision.colmap import FILES, read_colmap
 from photogrammetry.exchange.vision.opencv import read_opencv
+from photogrammetry.network.calibration_file import RESULT, read_calibration
 from photogrammetry.network.file import network_from_json
-from photogrammetry.network.model import Network
+from photogrammetry.network.model import ImageFrame, Network
+from photogrammetry.network.strict_text import read_json
 from rig.errors import BadInputError
 
 _OPENCV: Final = (".yml", ".yaml", ".json", ".xml")
@@ -33,8 +38,8 @@ def import_network(
     """Carry files over into a network.
 
     Args:
-        files: COLMAP's folder or files, calibrations of OpenCV and of anipose (TOML), exports of PhotoModeler, files of
-            AICON, surveys.
+        files: results of `svev calibrate`, COLMAP's folder or files, calibrations of OpenCV and of anipose (TOML),
+            exports of PhotoModeler, files of AICON, surveys.
         sigma: of image points (px) whose file gives none.
         sigma_mm: likewise in files that count in mm.
         length_unit: of the object system.
@@ -67,6 +72,8 @@ def _parts(files: Sequence[Path], sigma: float, sigma_mm: float | None) -> Itera
 
 def _part(path: Path, sigma: float, sigma_mm: float | None) -> Part:
     ending = path.suffix.lower()
+    if ending == ".json" and (result := read_json(path, "calibration")).get("format") == RESULT:
+        return _calibrated(path, ImageFrame(result.get("image_frame", ImageFrame.PIXEL.value)))
     if ending in _OPENCV:
         return read_opencv(path, sigma)
     if ending == ".toml":
@@ -79,3 +86,10 @@ def _part(path: Path, sigma: float, sigma_mm: float | None) -> Part:
         return read_photomodeler(path, sigma)
     known = ", ".join((".txt", ".toml", *_OPENCV, *ENDINGS))
     raise BadInputError(f"{path}: nothing is known that is called so; endings are {known}, or a folder of COLMAP")
+
+
+def _calibrated(path: Path, frame: ImageFrame) -> Part:
+    """The cameras of a calibration of ours, as constants."""
+    cameras = {name: camera.model_dump(exclude_none=True) for name, camera in read_calibration(path).items()}
+    note = f"{path}: interior orientations of {', '.join(cameras)} are taken as they are, without sigmas"
+    return Part(str(path), frame, cameras, notes=(note,))

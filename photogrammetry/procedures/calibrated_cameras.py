@@ -1,75 +1,15 @@
-"""Reads interior orientations from the result file of a calibration; step 2 takes them as constants."""
+"""Takes interior orientations from the result of a calibration; step 2 takes them as constants."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
 
 from photogrammetry.geometry.camera_model import INTERIOR, Distortion
-from photogrammetry.network.entries import Finite, Pixels, Positive
+from photogrammetry.network.calibration_file import CalibratedCamera
 from photogrammetry.network.model import Camera, Network, Role
 from photogrammetry.network.selection import only_points, rays, sub_network
-from photogrammetry.network.strict_text import read_json
 from rig.errors import BadInputError
-from rig.settings.strict_toml import validate
-
-
-class CalibratedCamera(BaseModel):
-    """One of `cameras` of a result; its sigmas and correlations are ignored."""
-
-    c: Positive
-    x0: Finite
-    y0: Finite
-    a1: Finite
-    a2: Finite
-    a3: Finite
-    b1: Finite
-    b2: Finite
-    c1: Finite
-    c2: Finite
-    r0: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
-    distortion: Literal["projected", "measured"]
-    size: Annotated[list[Pixels], Field(min_length=2, max_length=2)] | None = None
-
-
-class _GlobalTest(BaseModel):
-    """What the global test says; results of other programs have none."""
-
-    usable: bool = True
-    words: str = ""
-
-
-class _Result(BaseModel):
-    """The keys of a result that a calibration must have; all others are ignored."""
-
-    format: Literal["svev-adjustment/1"]
-    converged: bool
-    cameras: dict[str, Any] = {}
-    global_test: _GlobalTest = _GlobalTest()
-
-
-def read_calibration(path: Path) -> dict[str, CalibratedCamera]:
-    """Read the cameras of a result file (`svev-adjustment/1`).
-
-    Raises:
-        BadInputError: missing, unreadable, no result file, or one of a calibration that did not converge or whose
-            observations contradict each other.
-    """
-    result = validate(_Result, read_json(path), path)
-    if not result.converged:
-        raise BadInputError(f"{path}: this calibration has no result; calibrate again or name another file")
-    if not result.global_test.usable:
-        raise BadInputError(f"{path}: sigma0 of this result is {result.global_test.words}")
-    return {name: _camera(body, f"{path}: cameras.{name}") for name, body in result.cameras.items()}
-
-
-def _camera(body: Any, source: str) -> CalibratedCamera:
-    if not isinstance(body, dict):
-        raise BadInputError(f"{source}: is no object; name the result file of a calibration")
-    return validate(CalibratedCamera, body, source)
 
 
 def with_calibration(network: Network, cameras: Mapping[str, CalibratedCamera]) -> tuple[Network, list[str]]:

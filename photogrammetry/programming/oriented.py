@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from photogrammetry.geometry.camera_model import INTERIOR
+from photogrammetry.network.calibration_file import read_calibration
 from photogrammetry.network.file import network_from_json
 from photogrammetry.network.model import Network
 from photogrammetry.network.strict_text import read_object
-from photogrammetry.procedures.calibrated_cameras import read_calibration
 from photogrammetry.reports.result_file import FORMAT
 
 

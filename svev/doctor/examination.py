@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.settings.model import RigSettings
-from svev.doctor import disk, gpio, machine, measuring, network, trigger_box, webhook
+from svev.doctor import disk, gpio, machine, named_files, network, trigger_box, webhook
 from svev.doctor.cameras import exposure, firewire, gige
 from svev.doctor.finding import Finding, Topic, failure
 
@@ -41,9 +41,10 @@ def probes(rig: RigSettings, directory: Path, interrupted: bool | None = None) -
         Probe("Python", Topic.SOFTWARE, machine.look_at_python),
         Probe("packages", Topic.SOFTWARE, machine.look_at_packages, limit_s=30.0),
         Probe("camera libraries", Topic.SOFTWARE, lambda: machine.look_at_camera_libraries(rig), limit_s=10.0),
-        Probe("survey", Topic.SOFTWARE, lambda: measuring.look_at_survey(rig), limit_s=30.0),
-        Probe("calibration", Topic.SOFTWARE, lambda: measuring.look_at_calibration(rig), limit_s=30.0),
-        Probe("plan", Topic.SOFTWARE, lambda: measuring.look_at_plan(rig), limit_s=30.0),
+        Probe("survey", Topic.SOFTWARE, lambda: named_files.look_at_survey(rig), limit_s=30.0),
+        Probe("calibration", Topic.SOFTWARE, lambda: named_files.look_at_calibration(rig), limit_s=30.0),
+        Probe("plan", Topic.SOFTWARE, lambda: named_files.look_at_plan(rig), limit_s=30.0),
+        Probe("scenario", Topic.SOFTWARE, lambda: named_files.look_at_scenario(rig), limit_s=30.0),
         Probe("memory", Topic.MEMORY, lambda: machine.look_at_memory(rig)),
         Probe("shared memory", Topic.MEMORY, lambda: machine.look_at_shared_memory(rig)),
         Probe("huge pages", Topic.MEMORY, machine.look_at_huge_pages),

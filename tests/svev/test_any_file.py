@@ -9,8 +9,8 @@ import pytest
 from analysis.result.file import read
 from analysis.scene.survey import read_survey
 from photogrammetry.exchange.columns import read_survey_csv
+from photogrammetry.network.calibration_file import read_calibration
 from photogrammetry.network.file import read_network
-from photogrammetry.procedures.calibrated_cameras import read_calibration
 from rig.errors import BadInputError
 from tests.support.commands import run_svev
 

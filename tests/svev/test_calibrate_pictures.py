@@ -12,8 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.export.camera_calibration import calibration_for_log
+from analysis.scene.survey import read_survey
+from photogrammetry.network.calibration_file import read_calibration
 from photogrammetry.network.file import read_network
-from photogrammetry.procedures.calibrated_cameras import read_calibration
 from rig.settings.camera import Region
 from rig.settings.file import load_rig
 from svev.cli import main
@@ -60,6 +61,12 @@ def test_pictures_become_a_calibration_that_orient_and_the_rig_take(
     rig = load_rig(write_rig(tmp_path, loopback))
     one = rig.cameras[0].model_copy(update={"region": Region(width=480, height=360)})
     assert calibration_for_log(out / "calibration.json", (one,)) is not None
+    balls = tmp_path / "balls.csv"
+    balls.write_text("name,X,Y,Z,sigma\n" + "".join(f"B{i},{i},{i * i},{-i},0.012\n" for i in range(6)))
+    survey = tmp_path / "survey.json"
+    assert main(["network", "import", str(out / "calibration.json"), str(balls), "-o", str(survey)]) == 0
+    known = read_survey(survey).camera("K1")
+    assert (known.size, known.estimate, known.interior[0]) == ((480, 360), (), camera.c)
     network = read_network(out / "network.json")
     assert len(network.images) == 5
     assert "Verdict" in (out / "protocol.txt").read_text()

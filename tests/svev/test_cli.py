@@ -174,7 +174,7 @@ def test_a_table_of_balls_is_no_survey_and_leads_to_the_command_that_makes_one(
     table = tmp_path / "balls.csv"
     table.write_text("name,E,N,H,sigma\nB1,1.5,2.5,3.5,0.01\n")
     assert cli.main(["analyze", "no.mcap", "--survey", str(table), "--out", str(tmp_path / "out")]) == 2
-    assert f"svev network import K1.yml K2.yml K3.yml {table} -o survey.json" in capsys.readouterr().err
+    assert f"svev network import calibration.json {table} -o survey.json" in capsys.readouterr().err
 
 
 def test_cameras_that_do_not_answer_are_told_once_with_the_rig_file_for_the_doctor(

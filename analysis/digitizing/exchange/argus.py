@@ -30,7 +30,7 @@ from analysis.digitizing.marks.journal import Entered, Key
 from analysis.export.camera_calibration import plumb_bob, project
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.camera_model import INTERIOR
-from photogrammetry.procedures.calibrated_cameras import CalibratedCamera
+from photogrammetry.network.calibration_file import CalibratedCamera
 from rig.arrays import Floats
 from rig.errors import BadInputError
 

@@ -30,8 +30,8 @@ def import_command(
         list[Path],
         typer.Argument(
             metavar="FILE",
-            help="COLMAP's folder or files (.txt, .bin), OpenCV calibrations (.yml, .json, .xml), those of anipose "
-            "(.toml), a PhotoModeler export "
+            help="the result of svev calibrate (.json), COLMAP's folder or files (.txt, .bin), OpenCV calibrations "
+            "(.yml, .json, .xml), those of anipose (.toml), a PhotoModeler export "
             "(.txt), files of AICON (.ior, .eor, .phc, .obc), a survey (.csv: name, X, Y, Z, sigma)",
             show_default=False,
         ),
@@ -53,7 +53,7 @@ def import_command(
 
     Exit codes: 0 done, 2 bad input.
 
-    Example: svev network import K1.yml K2.yml K3.yml balls.csv -o survey.json
+    Example: svev network import calibration.json balls.csv -o survey.json
     """
     inside = [path / each.name for path in files if path.is_dir() for each in path.iterdir()]
     refuse_overwriting(output, *files, *inside)

@@ -6,8 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
+from photogrammetry.network.calibration_file import read_calibration
 from photogrammetry.network.file import read_network
-from photogrammetry.procedures.calibrated_cameras import read_calibration, with_calibration
+from photogrammetry.procedures.calibrated_cameras import with_calibration
 from photogrammetry.procedures.orientation import orient as orient_network
 from photogrammetry.reports.adjusted import Wishes
 from photogrammetry.reports.procedures import orientation_lines, orientation_report, orientation_to_json

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from analysis.export.camera_calibration import plumb_bob, project
 from analysis.export.scene_update import FRAME, camera_frames
 from photogrammetry.geometry.camera_model import INTERIOR
-from photogrammetry.procedures.calibrated_cameras import CalibratedCamera
+from photogrammetry.network.calibration_file import CalibratedCamera
 from rig.clocks import UtcNs
 from tests.analysis.simulated import SIZE, true_cameras
 

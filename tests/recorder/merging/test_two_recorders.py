@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from photogrammetry.procedures.calibrated_cameras import read_calibration
+from photogrammetry.network.calibration_file import read_calibration
 from recorder.checking.verify import verify
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets

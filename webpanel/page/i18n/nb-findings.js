@@ -81,9 +81,12 @@ export const findings = {
   check_keys_wrong: ["tripletter kan ikke publiseres: {why}", "rett network.curve_key_file"],
 
   check_survey_wrong: ["hopp kan ikke måles: {why}", "rett [analysis] i riggfilen, eller filen; før det måles ingen hopp"],
+  check_survey_lacks: ["{cameras} kan ikke måle: {why}", "ta disse kameraene med i innmålingen, eller kall dem det samme som der"],
   check_calibration_wrong: ["ingenting kan tas opp: {why}", "rett calibration i riggfilen, eller filen"],
   check_calibration: ["loggene inneholder kalibreringen i {file}"],
   check_plan_wrong: ["siden kan ikke hjelpe med å sikte: {why}", "rett plan i riggfilen, eller filen"],
+  check_scenario_wrong: ["ingenting kan simuleres: {why}", "rett scenario i riggfilen, eller filen"],
+  check_scenario: ["den simulerte bakken er den i {file}"],
   check_plan: ["kameraene siktes inn etter {file}"],
   check_exposures: ["eksponeringene tar høyst {exposure} ms, pulsene kommer hvert {period} ms"],
   check_survey: ["hopp måles med {file}"],

@@ -1,4 +1,4 @@
-"""Examines the files for measuring that the rig file names: the survey or the poses, the calibration, the plan."""
+"""Examines the files that the rig file names: survey or poses, calibration, plan, scenario of the simulated hill."""
 
 from collections.abc import Iterator
 
@@ -9,17 +9,30 @@ from svev.doctor.finding import Finding, Topic, failure, passed
 
 
 def look_at_survey(rig: RigSettings) -> Iterator[Finding]:
-    """Can the file that `[analysis]` of the rig file names be read? Otherwise no jump of a training is measured."""
+    """Can the file that `[analysis]` names be read, and are its cameras the rig's? Otherwise no jump is measured."""
     settings = rig.analysis
     if settings is None:
         return
-    from analysis.cameras.source import read_source  # noqa: PLC0415 - a rig that measures nothing need not wait for it
+    # a rig that measures nothing need not wait for it
+    from analysis.cameras.source import read_source  # noqa: PLC0415
+    from analysis.scene.survey import Survey  # noqa: PLC0415
 
+    sizes = {camera.name: (camera.region.width, camera.region.height) for camera in rig.cameras}
     try:
-        read_source(settings.survey, settings.calibration)
+        source = read_source(settings.survey, settings.calibration)
+        if isinstance(source, Survey):
+            lacking = source.cameras_of(sizes)[1]
+        else:
+            source.of_images(sizes)
+            lacking = {}
     except BadInputError as error:
         remedy = "correct [analysis] in the rig file, or the file; no jump is measured before that"
         yield failure(Topic.SOFTWARE, "check_survey_wrong", "jumps cannot be measured: {why}", remedy, why=error.said)
+        return
+    if lacking:
+        what, remedy = "{cameras} cannot measure: {why}", "add these cameras to the survey, or call them as it does"
+        why = next(iter(lacking.values()))
+        yield failure(Topic.SOFTWARE, "check_survey_lacks", what, remedy, cameras=", ".join(lacking), why=why)
     else:
         yield passed(
             Topic.SOFTWARE,
@@ -57,3 +70,21 @@ def look_at_plan(rig: RigSettings) -> Iterator[Finding]:
         yield failure(Topic.SOFTWARE, "check_plan_wrong", what, remedy, why=error.said)
     else:
         yield passed(Topic.SOFTWARE, "check_plan", "cameras are aimed by {file}", file=str(rig.plan))
+
+
+def look_at_scenario(rig: RigSettings) -> Iterator[Finding]:
+    """Can the scenario of simulated cameras be read, and has it these cameras? Otherwise nothing is recorded."""
+    if rig.simulation is None:
+        return
+    from simrig.world.scenario import load_scenario  # noqa: PLC0415 - a rig of real cameras loads nothing of this
+
+    try:
+        scenario = load_scenario(rig.simulation.scenario)
+        for camera in rig.cameras:
+            scenario.camera_index(camera.name)
+    except BadInputError as error:
+        what, remedy = "nothing can be simulated: {why}", "correct scenario in the rig file, or the file"
+        yield failure(Topic.SOFTWARE, "check_scenario_wrong", what, remedy, why=error.said)
+    else:
+        what = "the simulated hill is that of {file}"
+        yield passed(Topic.SOFTWARE, "check_scenario", what, file=str(rig.simulation.scenario))

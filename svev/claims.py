@@ -45,6 +45,8 @@ def folder_claim(directory: Path, program: str, option: str) -> Iterator[None]:
             stack.callback(os.close, folder)
             claimed = _lock(folder, _NO_FOLDER_LOCKS)
             file = _lock_file(folder, directory / LOCK) if claimed else None
+        except (FileExistsError, NotADirectoryError):
+            raise BadInputError(f"{directory}: is no folder; choose another {option}") from None
         except OSError as error:
             raise BadInputError(
                 f"{directory}: cannot be written ({error.strerror}); choose another {option} or correct its permissions"

@@ -273,6 +273,8 @@ def _one_line(error: SvevError | OSError) -> str:
     if error.errno in {errno.EMFILE, errno.ENFILE}:
         limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
         return f"too many files are open ({limit} are allowed here): run `ulimit -n 4096` and call again"
+    if error.errno in {errno.EEXIST, errno.ENOTDIR}:
+        return f"{error.filename}: a folder is wanted, and there is a file; choose another path"
     remedy = (
         f"choose a name of at most {NAME_MAX} bytes"
         if error.errno == errno.ENAMETOOLONG

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
-from analysis.scene.survey import require_metres
+from analysis.scene.units import require_metres
 from photogrammetry.geometry.camera_model import INTERIOR, Distortion
 from photogrammetry.geometry.rotation import nearest_rotation
 from photogrammetry.network.calibration_file import read_calibration

@@ -20,8 +20,9 @@ from analysis.scene.naming import Naming, NotNamedError, Spots, name_balls
 from analysis.scene.reflection import with_better_pose
 from analysis.scene.sought_balls import with_sought_balls
 from analysis.scene.static_image import StaticImage, static_images
-from analysis.scene.survey import KnownPoints, Survey, check_lengths
+from analysis.scene.survey import KnownPoints, Survey
 from analysis.scene.ties import Station, Tie, ball_size, find_ties
+from analysis.scene.units import check_lengths
 from photogrammetry.network.file import pixel_to_metric
 from photogrammetry.network.model import Camera, Image, Network, Role
 from photogrammetry.procedures.orientation import Orientation, orient
@@ -125,6 +126,8 @@ def orient_images(
         detections: what `detect_balls` finds in them, if that is known already.
     """
     cameras, strange = survey.cameras_of({name: image.size for name, image in static.items()})
+    if len(strange) > 1 and not cameras:
+        raise BadInputError(survey.lacks_all(tuple(strange)))
     known = survey.surveyed()
     found = detections or {name: detect_balls(image) for name, image in static.items()}
     views = {name: _view(camera, found[name], survey, known) for name, camera in cameras.items()}

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from analysis.scene.units import check_principal_distances, check_sigmas, require_metres
 from photogrammetry.network.file import network_from_json
 from photogrammetry.network.model import Camera, Image, ImageFrame, Network, Role
 from photogrammetry.network.strict_text import read_object
@@ -19,10 +20,6 @@ from rig.phrase import Phrase, phrase
 _SURVEYED = (Role.CONTROL, Role.FIXED)
 _FEWEST = 4  # surveyed balls
 _TABLES: Final = (".csv", ".txt", ".obc")  # what a total station or another program writes
-#: Radius of a ball, m: smaller ones no camera resolves from where a jump fits into its image, larger ones hide the
-#: jumper. Coordinates in mm or cm make a ball hundreds of times as large, those in km as small.
-_RADII_M: Final = (0.005, 2.0)
-_METRES: Final = ("", "m", "metre", "metres", "meter", "meters")  # as a label; the file need not have one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +87,17 @@ class Survey:
             there=there,
         )
 
+    def lacks_all(self, cameras: tuple[str, ...]) -> Phrase:
+        """Says that it has none of the cameras of a log."""
+        return phrase(
+            "survey_other_cameras",
+            "{source}: has none of the log's cameras {cameras} (there: {there}); name the survey of this hill, or call "
+            "its cameras as in the log",
+            source=self.source,
+            cameras=", ".join(cameras),
+            there=", ".join(camera.name for camera in self.network.cameras),
+        )
+
     def cameras_of(self, sizes: Mapping[str, tuple[int, int]]) -> tuple[dict[str, Camera], dict[str, Phrase]]:
         """The cameras of a log, and for those that it has not why there is none.
 
@@ -140,7 +148,7 @@ def read_survey(path: Path) -> Survey:
 
     Raises:
         BadInputError: no network file but a table, observations in it, metric image frame, no camera, several images of
-            one, or fewer than four surveyed balls, or a unit that is not the metre.
+            one, or fewer than four surveyed balls, or lengths that are not in metres, or c not in px.
     """
     try:
         data = read_object(path, "survey")
@@ -206,53 +214,11 @@ def read_survey(path: Path) -> Survey:
                 fewest=_FEWEST,
             )
         )
+    check_principal_distances(network.cameras, str(path))
+    check_sigmas(network.points, str(path))
     survey = Survey(network, str(path))
     _check_apart(survey.surveyed(), survey.source)
     return survey
-
-
-def require_metres(unit: str, source: str) -> None:
-    """Refuse an object system whose unit is another than the metre, in which speeds and lengths of a jump are told.
-
-    Args:
-        unit: `length_unit` of the file.
-        source: the file, for messages.
-
-    Raises:
-        BadInputError: it is another unit.
-    """
-    if unit.strip().lower() not in _METRES:
-        raise BadInputError(
-            phrase(
-                "survey_unit",
-                '{source}: "length_unit" is "{unit}", but jumps are measured in metres; write coordinates and sigmas '
-                'in metres, and "length_unit": "m"',
-                source=source,
-                unit=unit,
-            )
-        )
-
-
-def check_lengths(radius: float | None, source: str) -> None:
-    """Refuse a survey that makes the balls in the images larger or smaller than balls can be.
-
-    Args:
-        radius: of the balls in the unit of the survey; None if it is not known.
-        source: the file, for messages.
-
-    Raises:
-        BadInputError: its coordinates are no metres.
-    """
-    if radius is not None and not _RADII_M[0] <= radius <= _RADII_M[1]:
-        raise BadInputError(
-            phrase(
-                "survey_no_metres",
-                "{source}: with these coordinates the balls in the images are {size:.2g} m across, so they are not "
-                "in metres; write coordinates and their sigmas in metres",
-                source=source,
-                size=2 * radius,
-            )
-        )
 
 
 def _check_apart(known: KnownPoints, source: str) -> None:

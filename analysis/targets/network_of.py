@@ -1,7 +1,7 @@
 """The network file's object out of pictures of targets: corners are unknown points, of a frame that is only rigid."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from photogrammetry.network.model import (
     Role,
 )
 from photogrammetry.network.selection import RAYS
+from rig.arrays import Floats
 from rig.errors import BadInputError
 
 #: Unknowns of each camera at first; `with_significant` takes out the distortions that the pictures do not ask for.
@@ -35,6 +36,7 @@ _C, _PRINCIPAL, _RADIAL, _DECENTRING = 0.5, 0.05, 0.1, 0.005  # c: of itself; x0
 #: Corners that a picture needs to be worth its six unknowns.
 FEWEST_CORNERS = 8
 _FLAT_MM = 0.05  # sigma of a corner off the plane of a board that is said to be flat
+_OTHER_UNIT = 3.0  # times the nominal distance: prints are not that far off, other units are
 _PRINTED = 0.005  # sigma of its length, as part of the nominal one
 
 
@@ -108,7 +110,8 @@ def network_of(
             images=tuple(Image(picture.name, cameras.index(picture.camera), *start.poses[k]) for k, picture in used),
             points=tuple(Point(name, Role.TIE, start.places[name]) for name in names),
             observations=observed,
-            distances=tuple(_distance(each, number) for each in distances) or (_nominal(names, layout) if flat else ()),
+            distances=tuple(_distance(each, number, start.places) for each in distances)
+            or (_nominal(names, layout) if flat else ()),
             differences=_plane(names) if flat else (),
             datum=Datum(DatumType.INNER),
             length_unit="mm",
@@ -133,10 +136,16 @@ def _camera(name: str, c: float, size: tuple[int, int]) -> Camera:
     return Camera(name, interior, size=size, estimate=ESTIMATE, sigma=sigma)
 
 
-def _distance(measured: MeasuredDistance, number: dict[str, int]) -> Distance:
+def _distance(measured: MeasuredDistance, number: Mapping[str, int], places: Mapping[str, Floats]) -> Distance:
     for end in (measured.start, measured.end):
         if end not in number:
             raise BadInputError(f"--distance: corner {end} is in fewer than two pictures; name corners that are seen")
+    about = float(np.linalg.norm(places[measured.start] - places[measured.end]))
+    if not 1.0 / _OTHER_UNIT < measured.mm / about < _OTHER_UNIT:
+        raise BadInputError(
+            f"--distance: {measured.start} and {measured.end} are about {about:.0f} mm apart by the nominal size of "
+            f"the targets, not {measured.mm:g}; give it in mm, and --square-mm and --target-mm as the prints have them"
+        )
     return Distance(number[measured.start], number[measured.end], measured.mm, measured.sigma_mm)
 
 

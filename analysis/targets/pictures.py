@@ -53,7 +53,9 @@ def read_pictures(
             looked += 1
             done(looked)
     if not seen:
-        raise BadInputError(f"{', '.join(map(str, paths))}: no pictures in it; name a folder of pictures, or a log")
+        strange = f" that can be read ({notes[0]}); save them as PNG, TIFF or JPEG" if notes else ""
+        remedy = "" if notes else "; name a folder of pictures, or a log"
+        raise BadInputError(f"{', '.join(map(str, paths))}: no pictures in it{strange}{remedy}")
     _require_one_size(seen)
     _require_own_names(seen)
     seen = _without_doubled(seen, layout, notes)
@@ -102,7 +104,7 @@ def _of_files(paths: Sequence[Path], layout: Layout, notes: list[str] | None) ->
         elif path.suffix.lower() == _LOG:
             raise BadInputError(f"{path}: is a log in a folder of pictures; name the log itself")
         else:
-            notes.append(f"{name} is left out: it is no picture")
+            notes.append(f"{name} is left out: it is no picture of a format that is known")
 
 
 def _picture(path: Path) -> Grey | None:
@@ -111,7 +113,10 @@ def _picture(path: Path) -> Grey | None:
     image = cv2.imdecode(data, _READ) if len(data) else None
     if image is None or image.dtype == np.uint8:
         return None if image is None else np.asarray(image, np.uint8)
-    scale = 257.0 if image.dtype == np.uint16 else float(image.max()) / 255.0 or 1.0
+    if image.dtype == np.uint16:  # cameras put 10 or 12 bits into the lower end of 16
+        scale = ((1 << max(int(image.max()).bit_length(), 8)) - 1) / 255.0
+    else:
+        scale = float(image.max()) / 255.0 or 1.0
     return np.asarray(image / scale, np.float32)
 
 

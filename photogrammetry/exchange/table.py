@@ -170,8 +170,8 @@ def _check_count(row: Row, columns: Sequence[str], *, all_given: bool) -> None:
     count = len(row.cells)
     if any(row.cells[len(columns) :]):
         raise BadInputError(
-            f"{row.place}: {count} columns, but only {', '.join(columns)} are known; name them in the first line, and "
-            'write "..." around names with blanks or commas'
+            f"{row.place}: {count} columns, but only {', '.join(columns)} are known; name them in the first line, "
+            'write "..." around names with blanks or commas, and decimals with a point'
         )
     if all_given and count < len(columns):
         raise BadInputError(

@@ -36,9 +36,12 @@ def read_json(path: Path, kind: str = "network file") -> dict[str, Any]:
     Raises:
         BadInputError: missing, unreadable, not UTF-8, not JSON, not an object.
     """
+    text = read_text(path, "JSON", f"an existing {kind}")
+    if not text.strip():
+        raise BadInputError(f"{path}: is empty; name an existing {kind}")
     try:
         data = json.loads(
-            read_text(path, "JSON", f"an existing {kind}"),
+            text,
             object_pairs_hook=_no_key_twice,
             parse_constant=_no_constant,
             parse_int=_whole_number,

@@ -220,6 +220,13 @@ def _word(model: type[BaseModel], error: ErrorDetails) -> str:
         case "value_error":
             where = f'"{place}": ' if place else ""
             return where + str(error.get("ctx", {}).get("error", error["msg"]))
+        case "too_long" | "too_short" as kind:
+            there = error["ctx"]["actual_length"]
+            most = kind == "too_long"
+            wanted = f"{error['ctx']['max_length' if most else 'min_length']} {'at most' if most else 'at least'}"
+            numbers = isinstance(error["input"], list) and all(isinstance(each, int | float) for each in error["input"])
+            remedy = "correct it, decimals are written with a point" if most and numbers else "correct it"
+            return f'key "{place}" = {_shown(error["input"])}: {there} values, {wanted}; {remedy}'
         case _:
             what = f"{error['msg'][0].lower()}{error['msg'][1:]}"
             return f'key "{place}" = {_shown(error["input"])}: {what}; correct it'

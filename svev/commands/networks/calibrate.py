@@ -99,6 +99,8 @@ def calibrate(
             as_json=as_json,
         )
         return
+    if any(path.is_dir() or path.suffix.lower() == ".mcap" for path in network):
+        raise BadInputError(f"{network[0]}: holds pictures and is no network file; add --pictures")
     if len(network) != 1 or output is None:
         raise BadInputError("name one network file and -o RESULT.json, or pictures with --pictures")
     refuse_overwriting(output, network[0])

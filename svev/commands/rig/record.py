@@ -18,6 +18,7 @@ from service.headless import record as record_with
 from service.recordings.storage import new_log_path
 from svev import console
 from svev.claims import folder_claims
+from svev.doctor.cameras.exposure import exposes_on
 from svev.neighbours import naming_the_publisher
 
 
@@ -49,6 +50,9 @@ def record(
     settings = settings.without_absent() if allow_absent else settings
     _check_session(session)
     check_publication(settings.network)
+    for camera in settings.cameras:
+        if (finding := exposes_on(camera, settings)) is not None:
+            aside(f"warning: {finding.what}, so it misses pulses: {finding.remedy}")
     with (
         folder_claims(out, settings.recorder.fallback_directory, "svev record", "--out"),
         naming_the_publisher(settings.network.publish),

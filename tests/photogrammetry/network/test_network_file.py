@@ -204,7 +204,7 @@ def test_malformed_networks_are_refused(change: Change, message: str) -> None:
     ("content", "message"),
     [
         ("{", "not valid JSON: .*line 1.*correct it"),
-        ("", "not valid JSON"),
+        ("", "is empty; name an existing network file"),
         ("[]", "is no JSON object"),
         ('{"sigma0": NaN}', "NaN is no number"),
         ('{"sigma0": -Infinity}', "-Infinity is no number"),

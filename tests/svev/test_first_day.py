@@ -1,0 +1,106 @@
+"""Likely mistakes of a first day: each is one line that says what to do."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from analysis.scene.orientation import orient_images
+from analysis.scene.survey import read_survey
+from rig.errors import BadInputError
+from svev.cli import main
+from tests.analysis.scene.hill import survey_json, training, training_images
+from tests.support.loopback import Loopback
+from tests.support.rigs import write_rig
+
+Change = Callable[[dict[str, Any]], None]
+
+
+def _sigmas_in_mm(survey: dict[str, Any]) -> None:
+    survey["points"]["B3"]["sigma"] = [12, 12, 12]
+
+
+def _c_in_mm(survey: dict[str, Any]) -> None:
+    survey["cameras"]["K2"]["c"] = 8.0
+
+
+def _decimal_comma(survey: dict[str, Any]) -> None:
+    survey["points"]["B1"]["X"] = [0, 81, -3.09, -1.51]
+
+
+def _no_cameras(survey: dict[str, Any]) -> None:
+    survey["cameras"] = {}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (_sigmas_in_mm, "the sigma of ball B3 is 12.0 m, by which nothing can be named; write sigmas in metres"),
+        (_c_in_mm, "camera K2 has c = 8.0 px, so its picture of 640 px would be 177 degrees wide; write c in px"),
+        (_decimal_comma, "4 values, 3 at most; correct it, decimals are written with a point"),
+        (_no_cameras, "holds no camera; make a survey of calibration and balls: svev network import"),
+    ],
+    ids=["sigmas in mm", "c in mm", "decimal comma", "no cameras"],
+)
+def test_a_survey_with_a_usual_mistake(tmp_path: Path, change: Change, words: str) -> None:
+    survey = survey_json(training(), seed=1)
+    change(survey)
+    path = tmp_path / "survey.json"
+    path.write_text(json.dumps(survey))
+    with pytest.raises(BadInputError, match=path.name) as refused:
+        read_survey(path)
+    assert words in str(refused.value)
+
+
+def test_the_survey_of_another_hill_is_told_once(tmp_path: Path) -> None:
+    survey = survey_json(training(), seed=1)
+    survey["cameras"] = {f"cam{name}": camera for name, camera in survey["cameras"].items()}
+    path = tmp_path / "survey.json"
+    path.write_text(json.dumps(survey))
+    with pytest.raises(BadInputError) as refused:
+        orient_images(training_images(), read_survey(path))
+    said = str(refused.value)
+    assert "has none of the log's cameras K1, K2, K3 (there: camK1, camK2, camK3)" in said
+    assert said.count("survey.json") == 1
+
+
+def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:
+    path = tmp_path / "survey.json"
+    path.write_text("\n")
+    with pytest.raises(BadInputError, match=r"survey\.json: is empty; name an existing survey"):
+        read_survey(path)
+
+
+def test_decimal_commas_between_commas(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "balls.csv"
+    path.write_text("name,X,Y,Z\nB1,0,81,-3,09,-1,51\n")
+    assert main(["network", "import", str(path), "-o", str(tmp_path / "survey.json")]) == 2
+    assert "line 2: 7 columns, but only name, x, y, z are known" in (said := capsys.readouterr().err)
+    assert "and decimals with a point" in said
+
+
+def test_recordings_into_a_file(tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = str(write_rig(tmp_path, loopback, backend="sim"))
+    assert main(["record", "--rig", rig, "--seconds", "1", "--out", rig]) == 2
+    assert f"{rig}: is no folder; choose another --out" in capsys.readouterr().err
+
+
+def test_targets_into_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "print"
+    path.write_text("")
+    for folder in (path, path / "targets"):
+        assert main(["target", "-o", str(folder)]) == 2
+        assert "a folder is wanted, and there is a file; choose another path" in capsys.readouterr().err
+
+
+def test_an_exposure_longer_than_the_period(
+    tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = write_rig(tmp_path, loopback, backend="sim")
+    rig.write_text(rig.read_text().replace('backend = "sim"', 'backend = "sim"\nexposure_us = 40000', 1))
+    assert main(["record", "--rig", str(rig), "--seconds", "0.2", "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().err
+    assert "warning: K1: it exposes for 40.0 ms, pulses come every 33.3 ms, so it misses pulses" in said
+    assert "shorten exposure_us, or lower trigger.rate_hz" in said

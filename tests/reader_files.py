@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,6 +22,7 @@ from tests.photogrammetry.exchange.written import photomodeler_text, write_aicon
 from tests.photogrammetry.synthetic import hill
 from tests.recorder.importing.films import write_video
 from tests.recorder.merging.test_merge import write_part
+from tests.season.drawn import draw_season
 
 _FRAMES: Final = 140
 _FLASH: Final = 12
@@ -97,20 +99,39 @@ def write_results(folder: Path) -> None:
 
 
 def write_season(folder: Path) -> None:
-    """A campaign of one log."""
+    """A campaign of a log and of sixty that are measured already."""
+    season = draw_season(folder, jumps=60, athletes=5, days=5)
     (folder / "granasen").mkdir()
     os.link(folder / "jump.mcap", folder / "granasen" / "2026-11-21T19-40-18Z.mcap")
-    (folder / "season.toml").write_text(
-        'name = "Season 2026/27"\nout = "season-2026"\n[[hills]]\nname = "Hill"\nlogs = ["granasen"]\n'
-        'survey = "survey.json"\n[cluster]\nworkers = 1\n'
-    )
+    more = '[[hills]]\nname = "Granåsen"\nlogs = ["granasen"]\nsurvey = "survey.json"\n[cluster]\nworkers = 1\n'
+    season.file.write_text(season.file.read_text() + more)
+
+
+def write_firewire_rig(folder: Path) -> None:
+    """A rig of FireWire cameras, which are on the emulated bus."""
+    rig = (folder / "config" / "rigs" / "sim-firewire.toml").read_text()
+    (folder / "my-hill.toml").write_text(rig.replace("../scenarios/", "config/scenarios/"))
+
+
+def write_own_hill(folder: Path) -> None:
+    """The files that the page on a simulated hill of one's own shows, in their order."""
+    page = (Path(__file__).parent.parent / "docs" / "tutorials" / "own-hill.md").read_text()
+    shown = re.findall(r"```(?:toml|csv)\n(.*?)```", page, re.DOTALL)
+    (folder / "my-hill").mkdir()
+    for name, text in zip(("scenario.toml", "rig.toml", "cameras.toml", "balls.csv"), shown, strict=True):
+        (folder / "my-hill" / name).write_text(text)
+    apart = (folder / "config" / "rigs" / "sim.toml").read_text().partition("\n[network]\n")  # of tests beside this one
+    rig = folder / "my-hill" / "rig.toml"
+    rig.write_text(rig.read_text() + "".join(apart[1:]))
 
 
 #: By the name of the page.
 PREPARED: Final[dict[str, tuple[Callable[[Path], None], ...]]] = {
     "calibration": (write_pictures_of_targets,),
     "file-format": (write_two_logs,),
+    "firewire": (write_firewire_rig,),
     "measuring": (write_films, write_results),
     "network-file": (write_files_of_others,),
+    "own-hill": (write_own_hill,),
     "season": (write_season,),
 }

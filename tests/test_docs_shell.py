@@ -10,6 +10,8 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -17,12 +19,14 @@ import pytest
 
 from bench.analysis.hill_logs import write_hill_log
 from rig.settings.file import CONFIG
+from simrig.programs.simulated_hill import SimulatedHill
 from simrig.world.scenario import load_scenario
 from tests.reader_files import PREPARED
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
 from tests.support.waiting import wait_until
+from tests.svev.setup.terminal import Terminal
 from tests.test_docs import FENCE, PAGES, ROOT
 
 #: What is not run, by the beginning of the command, and why.
@@ -31,23 +35,20 @@ NOT_RUN: Final = {
     r"sudo |printf .*\| sudo|su -|apt |adduser |exit$|systemctl ": "changes the computer, as root",
     r"git clone |cd svev|source \.venv|tar xf ": "the checkout and the bundle: .ci/try-wheel, tests/systemd",
     r"rsync ": "needs another computer",
-    r"svev setup": "asks a person: tests/svev/setup answers it at a terminal",
-    r"svev cameras ": "needs a camera on a network port: tests/svev/test_cameras.py",
-    r"svev doctor --bus firewire": "needs a FireWire card",
-    r"svev demo --bus firewire": "tests/svev/test_demo.py runs it",
-    r"svev worker ": "goes on until it is stopped: tests/analysis/test_analyze.py",
-    r"svev analyze old\.mcap": "needs a survey of cameras of those names: tests/recorder/importing",
-    r"dask |svev season run .* --scheduler": "needs a cluster that goes on: tests/season",
-    r"svev season compare ": "needs thirty good jumps: tests/season/test_mixed_effects.py",
 }
 #: Commands that go on until somebody stops them, and what they say when they are ready.
 GOES_ON: Final = {
     r"svev serve ": "svev: panel at ",
     r"svev digitize ": "svev: measure at ",
     r"svev ctl log": "recording",
+    r"svev worker ": "results at ",
 }
+#: Commands that the next ones of the page need to go on, and what they say when they are ready.
+BESIDE: Final = {r"dask scheduler": "Scheduler at:", r"dask worker": "Registered to:"}
+#: Commands that ask a person, and what they ask first. All answers: tests/svev/setup.
+ASKS: Final = {r"svev setup": "English or Norwegian"}
 #: Commands that record at 30 Hz: on a busy computer frames are missing, and exit code 3 says so.
-_KEEPS_TIME: Final = re.compile(r"svev (doctor|rehearse|record|verify trial/|analyze trial/)")
+_KEEPS_TIME: Final = re.compile(r"svev (doctor|demo|rehearse|record|verify \S+\*|analyze \S+\*)")
 _PULSES: Final = range(22, 72)  # of the simulated hill: one whole jump
 
 
@@ -60,12 +61,16 @@ def _why_not(command: str) -> str | None:
     return next((why for pattern, why in NOT_RUN.items() if re.match(pattern, command)), None)
 
 
-def _goes_on(command: str) -> str | None:
-    return next((ready for pattern, ready in GOES_ON.items() if re.match(pattern, command)), None)
+def _says(patterns: Mapping[str, str], command: str) -> str | None:
+    return next((words for pattern, words in patterns.items() if re.match(pattern, command)), None)
 
 
 def _asks_the_service(command: str) -> bool:
     return command.startswith(("svev ctl ", "curl "))
+
+
+def _asks_a_camera(command: str) -> bool:
+    return command.startswith("svev cameras ")
 
 
 def _pages(*, asking: bool) -> list[Path]:
@@ -73,16 +78,19 @@ def _pages(*, asking: bool) -> list[Path]:
     return [
         page
         for page in PAGES
-        if any(_why_not(each) is None and _asks_the_service(each) is asking for each in _commands(page))
+        if any(
+            _why_not(each) is None and _asks_the_service(each) is asking and not _asks_a_camera(each)
+            for each in _commands(page)
+        )
     ]
 
 
-def test_every_reason_is_needed_and_most_commands_run() -> None:
+def test_every_reason_is_needed_and_every_command_of_svev_is_run() -> None:
     commands = [command for page in PAGES for command in _commands(page)]
-    for pattern in (*NOT_RUN, *GOES_ON):
+    for pattern in (*NOT_RUN, *GOES_ON, *BESIDE, *ASKS):
         assert any(re.match(pattern, command) for command in commands), f"no page has a command like {pattern}"
     of_svev = [command for command in commands if command.startswith("svev ")]
-    assert len([command for command in of_svev if _why_not(command) is None]) > 60
+    assert all(_why_not(command) is None for command in of_svev)
 
 
 def test_blocks_with_commands_are_shell_blocks() -> None:
@@ -111,12 +119,14 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _environment(folder: Path) -> dict[str, str]:
     """In which `svev` is that of this checkout."""
-    program = folder / "bin" / "svev"
-    if not program.exists():
-        program.parent.mkdir()
-        program.write_text(f'#!/bin/sh\nexec {sys.executable} -m svev "$@"\n')
-        program.chmod(0o755)
-    return {**os.environ, "PATH": f"{program.parent}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+    programs = folder / "bin"
+    if not programs.exists():
+        programs.mkdir()
+        for name in ("svev", "dask"):
+            program = programs / name
+            program.write_text(f'#!/bin/sh\nexec {sys.executable} -m {name} "$@"\n')
+            program.chmod(0o755)
+    return {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
 
 
 def _run(folder: Path, command: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -131,8 +141,9 @@ def _run(folder: Path, command: str, **environment: str) -> subprocess.Completed
     )
 
 
-def _run_until_ready(folder: Path, command: str, ready: str, **environment: str) -> None:
-    """Run a command of a page that goes on, and stop it, as with Ctrl-C, when it has said that it is ready.
+@contextmanager
+def _going_on(folder: Path, command: str, ready: str, **environment: str) -> Iterator[None]:
+    """Run a command of a page that goes on, until it has said that it is ready; stop it at the end, as with Ctrl-C.
 
     Args:
         folder: of the reader.
@@ -140,7 +151,7 @@ def _run_until_ready(folder: Path, command: str, ready: str, **environment: str)
         ready: what it says then.
         environment: more of it.
     """
-    said = folder / "said.txt"
+    said = folder / f"said-{'-'.join(command.split()[:2])}.txt"
     place = {**_environment(folder), **environment}
     asked = ["/bin/bash", "-c", f"exec {command}"]
     with (
@@ -150,6 +161,7 @@ def _run_until_ready(folder: Path, command: str, ready: str, **environment: str)
         try:
             wait_until(lambda: ready in said.read_text() or process.poll() is not None, f"{command}: {ready}", 120, 0.1)
             assert process.poll() is None, said.read_text()
+            yield
             process.send_signal(signal.SIGINT)
             assert process.wait(60) in {0, 130}, said.read_text()
         finally:
@@ -182,24 +194,65 @@ def place(recorded: Path, tmp_path: Path, loopback: Loopback) -> Path:
 def test_the_commands_of_a_page_run(page: Path, place: Path, recorded: Path, loopback: Loopback) -> None:
     for write in PREPARED.get(page.stem, ()):
         write(place)
-    for command in _commands(page):
-        if _why_not(command) is not None or _asks_the_service(command):
-            continue
-        if (ready := _goes_on(command)) is not None:
-            _run_until_ready(place, _at_own_address(command, loopback), ready)
-            continue
-        if "poses.json" in command and "-o poses.json" not in command and not (place / "poses.json").exists():
-            shutil.copy(recorded / "poses.json", place)  # of another page
-        done = _run(place, re.sub(r"\bLOG\b", "jump.mcap", command))
-        allowed = {0, 3} if _KEEPS_TIME.match(command) else {0}
-        assert done.returncode in allowed, f"{command}\n{done.stdout}\n{done.stderr}"
+    scheduler = loopback.free_port()
+    with ExitStack() as stack:
+        for command in _commands(page):
+            if _why_not(command) is not None or _asks_the_service(command) or _asks_a_camera(command):
+                continue
+            its = _at_own_address(command, loopback, scheduler)
+            if (ready := _says(BESIDE, command)) is not None:
+                stack.enter_context(_going_on(place, its, ready))
+            elif (ready := _says(GOES_ON, command)) is not None:
+                with _going_on(place, its, ready):
+                    pass
+            elif (question := _says(ASKS, command)) is not None:
+                _break_off(its, question, place)
+            else:
+                if "poses.json" in its and "-o poses.json" not in its and not (place / "poses.json").exists():
+                    shutil.copy(recorded / "poses.json", place)  # of another page
+                done = _run(place, re.sub(r"\bLOG\b", "jump.mcap", its))
+                allowed = {0, 3} if _KEEPS_TIME.match(command) else {0}
+                assert done.returncode in allowed, f"{command}\n{done.stdout}\n{done.stderr}"
 
 
-def _at_own_address(command: str, loopback: Loopback) -> str:
-    """A command that goes on, at an address where no test beside this one is."""
-    if not command.startswith("svev serve "):
-        return command
-    return f"{re.sub(r'--host [0-9.]+', '', command)} --host {loopback.host} --port {loopback.free_port()}"
+def _break_off(command: str, question: str, place: Path) -> None:
+    """Call a command at a terminal, and press Ctrl-C when it asks."""
+    with Terminal(*command.split()[1:], "--folder", str(place / "asked")) as terminal:
+        terminal.await_text(question)
+        terminal.type("\x03")
+        assert terminal.end() == 130
+    assert not (place / "asked").exists()
+
+
+def _at_own_address(command: str, loopback: Loopback, scheduler: int) -> str:
+    """A command, at addresses where no test beside this one is."""
+    host = loopback.host
+    if command.startswith("svev serve "):
+        return f"{re.sub(r'--host [0-9.]+', '', command)} --host {host} --port {loopback.free_port()}"
+    if command.startswith("svev worker "):
+        return f"{command} --bind {loopback.endpoint()}"
+    if command.startswith("dask scheduler"):
+        return f"dask scheduler --host {host} --port {scheduler} --no-dashboard"
+    if command.startswith("dask worker"):
+        command = f"{command.partition('#')[0]} --host {host} --no-dashboard --no-nanny"
+    return command.replace("tcp://one:8786", f"tcp://{host}:{scheduler}")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if any(map(_asks_a_camera, _commands(page)))], ids=lambda page: page.stem
+)
+def test_the_commands_of_a_page_find_and_move_a_camera(page: Path, tmp_path: Path, loopback: Loopback) -> None:
+    at, free = loopback.cameras(2)
+    shutil.copytree(CONFIG, tmp_path / "config")
+    with SimulatedHill(CONFIG / "scenarios" / "training.toml", {"K1": at}, 30.0, broadcast="127.255.255.255"):
+        for command in filter(_asks_a_camera, _commands(page)):
+            its = re.sub(r"\b192\.168\.11\.2\b", free, command).replace(" SERIAL ", f" {at} ")
+            if not its.startswith("svev cameras show"):
+                its += " --interface lo"  # other tests' cameras are left alone
+            done = _run(tmp_path, its)
+            assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+            assert {"list": at, "set-ip": free, "show": "ExposureTime"}[command.split()[2]] in done.stdout
 
 
 @pytest.mark.long
@@ -218,8 +271,9 @@ def test_the_commands_of_a_page_run_beside_the_service(page: Path, tmp_path: Pat
             if re.match(r"svev ctl (start|save) ", command):  # another example, not what follows the one before
                 _end_recording(service)
             its = re.sub(r"\d{4}-\d\d-\d\dT[\d-]+Z", recording, command).replace("http://127.0.0.1:8000", service.url)
-            if (ready := _goes_on(command)) is not None:
-                _run_until_ready(tmp_path, its, ready, SVEV_URL=service.url)
+            if (ready := _says(GOES_ON, command)) is not None:
+                with _going_on(tmp_path, its, ready, SVEV_URL=service.url):
+                    pass
                 continue
             done = _run(tmp_path, its, SVEV_URL=service.url)
             assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"

@@ -11,6 +11,7 @@ import numpy as np
 
 from analysis.scene.units import check_principal_distances, check_sigmas, require_metres
 from photogrammetry.network.file import network_from_json
+from photogrammetry.network.formats import NETWORK, require_format
 from photogrammetry.network.model import Camera, Image, ImageFrame, Network, Role
 from photogrammetry.network.strict_text import read_object
 from rig.arrays import Floats
@@ -163,6 +164,7 @@ def read_survey(path: Path) -> Survey:
                 path=str(path),
             )
         ) from None
+    require_format(data, NETWORK, path)
     if data.get("observations"):
         raise BadInputError(
             phrase(

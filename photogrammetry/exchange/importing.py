@@ -15,8 +15,9 @@ from photogrammetry.exchange.table import ENDINGS
 from photogrammetry.exchange.vision.camera_toml import read_camera_toml
 from photogrammetry.exchange.vision.colmap import FILES, read_colmap
 from photogrammetry.exchange.vision.opencv import read_opencv
-from photogrammetry.network.calibration_file import RESULT, read_calibration
+from photogrammetry.network.calibration_file import read_calibration
 from photogrammetry.network.file import network_from_json
+from photogrammetry.network.formats import RESULT
 from photogrammetry.network.model import ImageFrame, Network
 from photogrammetry.network.strict_text import read_json
 from rig.errors import BadInputError

@@ -1,17 +1,15 @@
 """Reads interior orientations from the result file of a calibration."""
 
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
 from photogrammetry.network.entries import Finite, Pixels, Positive
+from photogrammetry.network.formats import RESULT, require_format
 from photogrammetry.network.strict_text import read_json
 from rig.errors import BadInputError
 from rig.settings.strict_toml import validate
-
-#: The format of results, which `svev calibrate`, `orient` and `adjust` write.
-RESULT: Final = "svev-adjustment/1"
 
 
 class CalibratedCamera(BaseModel):
@@ -55,7 +53,9 @@ def read_calibration(path: Path) -> dict[str, CalibratedCamera]:
         BadInputError: missing, unreadable, no result file, or one of a calibration that did not converge or whose
             observations contradict each other.
     """
-    result = validate(_Result, read_json(path), path)
+    data = read_json(path)
+    require_format(data, RESULT, path)
+    result = validate(_Result, data, path)
     if not result.converged:
         raise BadInputError(f"{path}: this calibration has no result; calibrate again or name another file")
     if not result.global_test.usable:

@@ -21,6 +21,7 @@ from photogrammetry.network.entries import (
     PointEntry,
 )
 from photogrammetry.network.faults import Faults, WrongEntryError
+from photogrammetry.network.formats import NETWORK, require_format
 from photogrammetry.network.model import (
     AXES,
     RESERVED_GROUPS,
@@ -57,6 +58,7 @@ def read_network(path: Path) -> Network:
     data = read_object(path)
     if "format" not in data and ("balls" in data or "rods" in data):
         raise BadInputError(f"{path}: is a plan; svev plan {path} --simulate NETWORK.json makes a network of it")
+    require_format(data, NETWORK, path)
     return network_from_json(data, str(path))
 
 

@@ -9,6 +9,8 @@ import pytest
 
 from analysis.scene.orientation import orient_images
 from analysis.scene.survey import read_survey
+from photogrammetry.network.calibration_file import read_calibration
+from photogrammetry.network.file import read_network
 from rig.errors import BadInputError
 from svev.cli import main
 from tests.analysis.scene.hill import survey_json, training, training_images
@@ -64,6 +66,28 @@ def test_the_survey_of_another_hill_is_told_once(tmp_path: Path) -> None:
     said = str(refused.value)
     assert "has none of the log's cameras K1, K2, K3 (there: camK1, camK2, camK3)" in said
     assert said.count("survey.json") == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("svev-truth/1", "is the truth of a simulated recording, and a network or survey is wanted; name another file"),
+        ("svev-adjustment/1", "is a result of svev calibrate, orient or adjust, and a network or survey is wanted; of"),
+    ],
+)
+def test_another_file_of_ours(tmp_path: Path, kind: str, words: str) -> None:
+    path = tmp_path / "file.json"
+    path.write_text(json.dumps({"format": kind, "observations": [1], "cameras": {}}))
+    for read in (read_survey, read_network):
+        with pytest.raises(BadInputError, match=words):
+            read(path)
+
+
+def test_a_survey_as_calibration(tmp_path: Path) -> None:
+    path = tmp_path / "survey.json"
+    path.write_text(json.dumps(survey_json(training(), seed=1)))
+    with pytest.raises(BadInputError, match=r"is a network or survey, and a result .* is wanted; a survey is given as"):
+        read_calibration(path)
 
 
 def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:

@@ -146,7 +146,7 @@ def test_paper_weights(run: Run) -> None:
         ),
         ({"cameras": {"K1": 3}}, "cameras.K1: is no object"),
         ({"cameras": {"K1": {"c": -1.0}}}, "cameras.K1"),
-        ({"format": "svev-network/1"}, "format"),
+        ({"format": "svev-network/1"}, "is a network or survey, and a result of svev calibrate"),
     ],
 )
 def test_bad_calibration_is_one_line(

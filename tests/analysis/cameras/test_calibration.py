@@ -185,5 +185,5 @@ def test_a_calibration_that_does_not_belong_to_the_log_is_refused(
 
 def test_a_survey_is_no_calibration(tmp_path: Path) -> None:
     (tmp_path / "survey.json").write_text(json.dumps(survey_json(training(), 1)))
-    with pytest.raises(BadInputError, match="format"):
+    with pytest.raises(BadInputError, match=r"is a network or survey, .* a survey is given as --survey"):
         read_poses(tmp_path / "survey.json")

@@ -59,13 +59,18 @@ class Stream:
         self._socket = socket
         self.refused = 0
 
-    def fileno(self) -> int:
-        """The descriptor of the socket, for a poller of ZeroMQ."""
-        return int(self._socket.fileno())
+    def next(self, timeout_s: float, wake: int | None = None) -> Received | None:
+        """The next triplet; None if none comes within `timeout_s`, or if what comes is none.
 
-    def next(self, timeout_s: float) -> Received | None:
-        """The next triplet; None if none comes within `timeout_s`, or if what comes is none."""
-        if not self._socket.poll(round(timeout_s * 1000)):
+        Args:
+            timeout_s: how long to wait.
+            wake: a descriptor; as soon as it can be read, nothing is waited for.
+        """
+        poller = zmq.Poller()
+        poller.register(self._socket, zmq.POLLIN)
+        if wake is not None:
+            poller.register(wake, zmq.POLLIN)
+        if self._socket not in dict(poller.poll(round(timeout_s * 1000))):
             return None
         parts = self._socket.recv_multipart(copy=False)
         if parts[0].bytes != _TOPIC:

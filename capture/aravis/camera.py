@@ -10,12 +10,12 @@ The ids of a buffer whose status is not SUCCESS mean nothing: they may be those 
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
-import gi
-
 from capture.aravis.action import lock_clock
 from capture.aravis.clock import CameraClock
-from capture.aravis.configuration import configure, gain_steps, region_limits
+from capture.aravis.configuration import configure, region_limits
 from capture.aravis.features import Features, text_at
+from capture.aravis.gain import gain_steps
+from capture.aravis.library import Aravis, GLib
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
 from capture.aravis.source_filter import SourceFilter, filter_control, open_sockets
 from capture.aravis.trigger import SOFTWARE_TRIGGER
@@ -31,13 +31,6 @@ from rig.settings.model import NetworkSettings
 from rig.settings.region import RegionLimits
 from rig.settings.trigger import ActionTrigger, ExternalTrigger, SoftwareTrigger, Trigger
 from rig.transport.ring import CameraRing
-
-gi.require_version("Aravis", "0.8")
-from gi.repository import Aravis, GLib  # noqa: E402  (the version must be required first)
-
-# Aravis looks for GigE Vision cameras only: looking on USB too opens sockets and timers for the life of the process.
-for _interface in ("USB3Vision", "Fake"):
-    Aravis.disable_interface(_interface)
 
 _NAMES: Final = ((0x48, 32), (0x68, 32), (0xD8, 16))  # vendor, model, serial number: GigE Vision 2.0, section 28
 _STREAM_SOURCE_PORT = 0x0D1C  # GigE Vision 2.0, section 28
@@ -251,8 +244,8 @@ class AravisCamera:
         )
         if self._action is not None and self._action.scheduled:
             lock_clock(self._features, settings.name)
-        self._features.remember("GevSCPSPacketSize")
-        self._camera.gv_set_packet_size(network.packet_size)
+        if self._features.set_number("GevSCPSPacketSize", network.packet_size, up_to=True) is None:
+            self._camera.gv_set_packet_size(network.packet_size)
         if self._plain_socket:
             self._camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
         self._id_modulus = 0 if self._features.switch("GevGVSPExtendedIDMode", on=True) else _IDS_16_BIT

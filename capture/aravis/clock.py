@@ -7,14 +7,10 @@ register is not there (SFNC 2.7, chapter 2).
 from collections.abc import Callable, Iterable
 from typing import Final
 
-import gi
-
 from capture.aravis.features import Features
+from capture.aravis.library import Aravis, GLib
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError
-
-gi.require_version("Aravis", "0.8")
-from gi.repository import Aravis, GLib  # noqa: E402  (the version must be required first)
 
 _FREQUENCY_HIGH, _FREQUENCY_LOW = 0x093C, 0x0940
 _CONTROL, _LATCH = 0x0944, 2

@@ -5,9 +5,11 @@ is missing or refuses is told with what it costs. Only what would make a recordi
 pixel format or input, a camera that cannot be triggered frame by frame.
 """
 
+import re
 from typing import Final
 
 from capture.aravis.features import Features
+from capture.aravis.gain import set_gain
 from capture.aravis.trigger import listed, set_trigger, sets_exposure_time
 from rig.action import ActionKeys
 from rig.errors import CameraError
@@ -19,19 +21,23 @@ _SWITCHED_OFF: Final = {
     "AcquisitionFrameRateEnable": "it may ignore pulses that come faster than its own frame rate",
     "AcquisitionFrameRateEnabled": "it may ignore pulses that come faster than its own frame rate",
     "AcquisitionFrameRateAuto": "it may ignore pulses that come faster than its own frame rate",
+    "AcquisitionFrameRateMode": "it may ignore pulses that come faster than its own frame rate",
     "ExposureAuto": "its exposure time changes with the light",
-    "GainAuto": "its gain changes with the light",
     "BlackLevelAuto": "its black level changes with the light",
     "BalanceWhiteAuto": "its colours change with the light",
     "GammaEnable": "its grey values are not proportional to the light",
     "GammaEnabled": "its grey values are not proportional to the light",
+    "LUTEnable": "its grey values are not proportional to the light",
+    "SequencerMode": "its settings change from frame to frame",
+    "SequenceEnable": "its settings change from frame to frame",
     "ChunkModeActive": "it adds data to its frames",
     "TestPattern": "it may send a test picture",
     "TestImageSelector": "it may send a test picture",
 }
 #: Changes of the image that would make every measurement wrong.
 _AS_THE_SENSOR_SEES: Final = ("ReverseX", "ReverseY")
-_ONE: Final = ("1", "x1", "Off", "None")  # as an enumeration says that nothing is reduced
+#: As an enumeration says that nothing is reduced: 1, x1, Off, BinningHorizontal1.
+_ONE: Final = re.compile(r"\D*1|Off|None")
 _NOT_REDUCED: Final = ("BinningHorizontal", "BinningVertical", "DecimationHorizontal", "DecimationVertical")
 #: Frames per second that exposure, region and link allow, by the names of Basler, Hikrobot, FLIR and Allied Vision.
 _FASTEST: Final = (
@@ -39,8 +45,10 @@ _FASTEST: Final = (
     "AcquisitionFrameRateLimit",
 )  # fmt: skip
 _RATE_SHARE: Final = 0.99
+#: Steps of Gamma are smaller.
+_GAMMA: Final = 0.01
 #: Exposure and gain may differ so much from those wanted before that is said: steps of the sensor are smaller.
-_EXPOSURE_SHARE, _EXPOSURE_US, _GAIN_DB = 0.02, 20.0, 0.5
+_EXPOSURE_SHARE, _EXPOSURE_US = 0.02, 20.0
 
 
 def configure(
@@ -63,17 +71,29 @@ def configure(
     """
     features.execute("AcquisitionStop")  # a program that crashed may have left it running, which locks most features
     features.set_number("TLParamsLocked", 0)
+    _switch_off(features)  # some of it locks what is set now
+    _set_image(features, settings)
+    notices = set_trigger(features, settings, software=software, action=action)
+    timed = not features.has("ExposureMode") or sets_exposure_time(features)
+    notices += _switch_off(features)  # some of it is there only with this pixel format, trigger and exposure mode
+    notices += _set_exposure(features, settings.exposure_us, timed=timed)
+    notices += set_gain(features, settings)
+    notices += _too_slow(features, rate_hz)
+    return [f"camera {settings.name}: {notice}" for notice in notices]
+
+
+def _switch_off(features: Features) -> list[str]:
+    """Switch off what other programs may have left on; what stays on."""
     notices = [
-        f"{name} stays on: {cost}"
+        f"{name} stays {features.chosen(name) or 'on'}: {cost}"
         for name, cost in _SWITCHED_OFF.items()
         if features.has(name) and not features.switch(name, on=False)
     ]
-    _set_image(features, settings)
-    notices += set_trigger(features, settings, software=software, action=action)
-    notices += _set_exposure(features, settings.exposure_us)
-    notices += _set_gain(features, settings)
-    notices += _too_slow(features, rate_hz)
-    return [f"camera {settings.name}: {notice}" for notice in notices]
+    if not features.has("GammaEnable") and not features.has("GammaEnabled"):
+        gamma = features.set_number("Gamma", 1.0)
+        if gamma is not None and abs(gamma - 1.0) > _GAMMA:
+            notices.append(f"its Gamma stays {gamma:g}: its grey values are not proportional to the light")
+    return notices
 
 
 def region_limits(features: Features) -> RegionLimits | None:
@@ -102,7 +122,8 @@ def _set_image(features: Features, settings: CameraSettings) -> None:
     for feature in _NOT_REDUCED:
         if (got := features.set_number(feature, 1)) not in {None, 1.0}:
             raise CameraError(f"camera {name} reduces its images ({feature} is {got:g}): set {feature} to 1")
-        if features.entries(feature) and features.choose(feature, *_ONE) is None:
+        entries = features.entries(feature)
+        if entries and features.choose(feature, *filter(_ONE.fullmatch, entries)) is None:
             raise CameraError(
                 f"camera {name} reduces its images ({feature} is {features.chosen(feature)}): set {feature} to 1"
             )
@@ -127,8 +148,8 @@ def _set_image(features: Features, settings: CameraSettings) -> None:
         raise CameraError(f"camera {name} takes no frames one after the other (AcquisitionMode Continuous)")
 
 
-def _set_exposure(features: Features, wanted_us: float) -> list[str]:
-    if features.has("ExposureMode") and not sets_exposure_time(features):
+def _set_exposure(features: Features, wanted_us: float, *, timed: bool) -> list[str]:
+    if not timed:
         return ["its exposure time cannot be set (ExposureMode): motion blur and brightness are what the camera makes"]
     name = features.first_number("ExposureTime", "ExposureTimeAbs", "Exposure")
     if name is not None:
@@ -155,47 +176,3 @@ def _too_slow(features: Features, rate_hz: float) -> list[str]:
         "choose a smaller region"
     )
     return [slow]
-
-
-def gain_steps(features: Features) -> tuple[int, int] | None:
-    """Least and largest gain of a camera that has it in steps alone; None for others."""
-    bounds = None if features.first_number("Gain", "GainAbs") else features.bounds("GainRaw")
-    return None if bounds is None else bounds[:2]
-
-
-def _set_gain(features: Features, settings: CameraSettings) -> list[str]:
-    features.choose("GainSelector", "All", "AnalogAll")
-    if settings.gain_raw is not None:
-        return _set_gain_steps(features, settings.gain_raw)
-    name, wanted_db = features.first_number("Gain", "GainAbs"), settings.gain_db
-    if name is not None:
-        got = features.set_number(name, wanted_db)
-        if got is None or abs(got - wanted_db) > _GAIN_DB:
-            return [f"its gain is {'unknown' if got is None else f'{got:g} dB'}, not {wanted_db:g} dB"]
-        return []
-    bounds = features.bounds("GainRaw")
-    if bounds is None:
-        return ["it has no gain"] if wanted_db else []
-    least, most, _ = bounds
-    if settings.gain_step_db is not None:
-        return _set_gain_steps(features, least + round(wanted_db / settings.gain_step_db))
-    notices = _set_gain_steps(features, least)
-    if wanted_db:
-        notices.append(
-            f"its gain has no unit (GainRaw, {least} to {most}), so it is at its least: set gain_raw, or gain_step_db "
-            "from its manual"
-        )
-    return notices
-
-
-def _set_gain_steps(features: Features, wanted: int) -> list[str]:
-    """Set the gain in the camera's own steps."""
-    bounds = features.bounds("GainRaw")
-    if bounds is None:
-        return ["it has no GainRaw, so gain_raw sets nothing: use gain_db"]
-    least, most, step = bounds
-    got = features.set_number("GainRaw", wanted)
-    got = features.number("GainRaw") if got is None else got
-    if got is None or abs(got - wanted) > step / 2:
-        return [f"its GainRaw is {'unknown' if got is None else f'{got:g}'}, not {wanted} (it takes {least} to {most})"]
-    return []

@@ -4,13 +4,11 @@ Nothing here raises because a feature is missing or refuses a value: the caller 
 """
 
 import ctypes
+import math
 from contextlib import suppress
 from typing import Final
 
-import gi
-
-gi.require_version("Aravis", "0.8")
-from gi.repository import Aravis, GLib  # noqa: E402  (the version must be required first)
+from capture.aravis.library import Aravis, GLib
 
 #: Nodes of a description that may bear the name of a feature, and are none: makers name categories "Gain".
 _NO_FEATURES: Final = (Aravis.GcCategory, Aravis.GcPort)
@@ -146,8 +144,13 @@ class Features:
         except GLib.Error:
             return False
 
-    def set_number(self, name: str, value: float) -> float | None:
-        """Set a number, within the limits that the camera names, unless it is so already.
+    def set_number(self, name: str, value: float, *, up_to: bool = False) -> float | None:
+        """Set a number, within the limits and steps that the camera names, unless it is so already.
+
+        Args:
+            name: of the feature.
+            value: what it should be.
+            up_to: of an integer's steps the next lower one is taken, not the nearest.
 
         Returns:
             What it is now; None if there is no such number, or the camera refuses and it is another one.
@@ -164,11 +167,27 @@ class Features:
             else:
                 low, high = self._device.get_integer_feature_bounds(name)
                 step = max(1, self._device.get_integer_feature_increment(name))
-                steps = min(round((min(max(value, low), high) - low) / step), (high - low) // step)
+                steps = (min(max(value, low), high) - low) / step
+                steps = min(math.floor(steps) if up_to else round(steps), (high - low) // step)
                 self._write(name, low + steps * step)
         except GLib.Error:
             return None
         return self.number(name)
+
+    def unit(self, name: str) -> str:
+        """Unit of a number; empty if none is told."""
+        return str(self._device.get_feature(name).get_unit() or "") if self._is_number(name) else ""
+
+    def least(self, name: str) -> float | None:
+        """Least value of a number at present; None if it cannot be read."""
+        try:
+            if not self._is_number(name):
+                return None
+            if isinstance(self._device.get_feature(name), Aravis.GcFloat):
+                return float(self._device.get_float_feature_bounds(name)[0])
+            return float(self._device.get_integer_feature_bounds(name)[0])
+        except GLib.Error:
+            return None
 
     def bounds(self, name: str) -> tuple[int, int, int] | None:
         """Least value, largest value and step of an integer at present; None if it cannot be read."""

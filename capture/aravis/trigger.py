@@ -19,6 +19,10 @@ SOFTWARE_TRIGGER: Final = "TriggerSoftware"
 #: Triggers that take one frame per pulse, the best first, and the feature that has to be 1 for that.
 _ONE_FRAME: Final = {"FrameStart": "", "FrameBurstStart": "AcquisitionBurstFrameCount", "ExposureStart": "",
                      "AcquisitionStart": "AcquisitionFrameCount"}  # fmt: skip
+#: How long an input waits for a steady level, by the names of Hikrobot, Basler, Teledyne Dalsa, FLIR and Allied Vision.
+_DEBOUNCERS: Final = (
+    "LineDebouncerTime", "LineDebouncerTimeAbs", "lineDebouncingPeriod", "LineFilterWidth", "LineDebounceDuration",
+)  # fmt: skip
 _EDGES: Final = {"rising": "RisingEdge", "falling": "FallingEdge"}
 #: Exposure modes by which a pulse begins an exposure of `exposure_us`, without TriggerMode.
 _BY_EXPOSURE_MODE: Final = ("EdgePreSelect", "EdgePreselect")
@@ -48,7 +52,10 @@ def set_trigger(
         return _set_line(features, settings, software=software, action=action)
     name = settings.name
     _select(features, name)
-    notices = [] if software or action else _set_input(features, settings)
+    # With some makers sources are there only while the trigger is on.
+    at_once = features.has("TriggerSource")
+    by_cable = not software and action is None
+    notices = _set_input(features, settings) if by_cable and at_once else []
     for divider in ("TriggerDivider", "TriggerMultiplier"):
         if features.set_number(divider, 1) not in {None, 1.0}:
             notices.append(f"{divider} stays {features.number(divider):g}: it does not take one frame per pulse")
@@ -56,8 +63,10 @@ def set_trigger(
     if delay is not None and (left := features.set_number(delay, 0)) != 0:
         notices.append(f"{delay} stays {left or features.number(delay) or 0:g}: it exposes so much later")
     features.choose("TriggerOverlap", "ReadOut", "PreviousFrame")  # else pulses during the readout are ignored
-    if features.choose("TriggerMode", "On") is None:
+    if not _switch_on(features):
         raise CameraError(f"camera {name} cannot be triggered ({_why_not(features)}): use another camera")
+    if by_cable and not at_once:
+        notices += _set_input(features, settings)
     if action is not None:
         set_action_trigger(features, name, action, "TriggerSource")
     if software and (features.choose("TriggerSource", "Software") is None or not features.has(SOFTWARE_TRIGGER)):
@@ -71,12 +80,19 @@ def sets_exposure_time(features: Features) -> bool:
     return features.chosen("ExposureMode") in _BY_EXPOSURE_MODE or features.choose("ExposureMode", "Timed") is not None
 
 
+def _switch_on(features: Features) -> bool:
+    """Switch the selected trigger on: an enumeration, which may have further modes, or a boolean."""
+    if features.entries("TriggerMode"):
+        return features.choose("TriggerMode", "On") is not None
+    return features.switch("TriggerMode", on=True)
+
+
 def _select(features: Features, name: str) -> None:
     """Switch all triggers off, and select the one that takes one frame per pulse."""
     selectors = features.entries("TriggerSelector")
     for selector in selectors:
         if features.choose("TriggerSelector", selector):
-            features.choose("TriggerMode", "Off")
+            features.switch("TriggerMode", on=False)
     chosen = features.choose("TriggerSelector", *_ONE_FRAME)
     count = _ONE_FRAME.get(chosen or "")
     if (selectors and chosen is None) or (count and features.set_number(count, 1) not in {1.0, None}):
@@ -113,7 +129,7 @@ def _set_input(features: Features, settings: CameraSettings) -> list[str]:
         notices.append(f"it takes pulses at any of its inputs, not only at {wanted}")
     if features.choose("LineSelector", wanted):
         features.choose("LineMode", "Input")
-        debouncer = features.first_number("LineDebouncerTime", "LineDebouncerTimeAbs")
+        debouncer = features.first_number(*_DEBOUNCERS)
         if debouncer is not None and (wait := features.number(debouncer)):
             notices.append(f"its input waits {wait:g} us for a steady level ({debouncer}): it exposes so much later")
     edge = _EDGES[settings.trigger_edge]

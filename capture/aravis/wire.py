@@ -171,7 +171,8 @@ def _write(features: Features, delay_ns: float, bytes_s: float) -> list[str]:
 def _delay(features: Features, name: str, ticks: int) -> bool:
     """Set the delay between packets; whether it is nearly so now. If not, there is none."""
     got = features.set_number(name, ticks)
-    if got is not None and abs(got - ticks) <= _NEAR * ticks:
+    least, _, step = features.bounds(name) or (0, 0, 1)
+    if got is not None and abs(got - max(ticks, least)) <= max(_NEAR * ticks, step):
         return True
     features.set_number(name, 0)
     return False

@@ -4,7 +4,7 @@ A description (GenICam XML) names registers at any address. What the other camer
 is written there is read there, except where the description says that it can only be read.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Final
 from xml.etree import ElementTree as ET
 
@@ -26,6 +26,7 @@ class DescribedMap(RegisterMap):
 
     Attributes:
         made: whether the camera is as its maker has made it: before, everything may be written.
+        refuses: whether it refuses to have an address written in its present state; its description says so at best.
     """
 
     def __init__(self, registers: Iterable[Register], description: bytes) -> None:
@@ -33,6 +34,7 @@ class DescribedMap(RegisterMap):
         self._others: dict[int, bytes] = {}
         self._read_only = _read_only(description)
         self.made = False
+        self.refuses: Callable[[int], bool] = lambda _: False
 
     def read(self, address: int, count: int) -> bytes:
         """See `RegisterMap.read`."""
@@ -47,7 +49,7 @@ class DescribedMap(RegisterMap):
         if self._ours(address):
             super().write(address, data)
             return
-        if self.made and address in self._read_only:
+        if self.made and (address in self._read_only or self.refuses(address)):
             raise RegisterError(Status.WRITE_PROTECT)
         for place in range(0, len(data), WORD):
             self._others[address + place] = data[place : place + WORD].ljust(WORD, b"\0")

@@ -6,7 +6,7 @@ connection, and the simulated sensor obeys that.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +18,7 @@ from capture.aravis.camera import AravisCamera
 from capture.aravis.features import Features
 from rig.clocks import host_now
 from rig.images.pixels import FORMATS
-from rig.settings.model import RigSettings
+from rig.settings.model import PacketDelay, RigSettings
 from rig.transport.ring import CameraRing
 from simrig.gige.camera import Camera
 from simrig.gige.configuration import CameraConfig
@@ -56,14 +56,34 @@ class Described:
         self._camera = camera
 
     @contextmanager
-    def opened(self) -> Iterator[AravisCamera]:
+    def opened(
+        self, *, packet_size: int | None = None, packet_delay: PacketDelay = "auto", **settings: Any
+    ) -> Iterator[AravisCamera]:
         """The camera, opened by the back end."""
-        settings = self.rig.cameras[0].model_copy(update={"trigger_input": self.input})
-        camera = AravisCamera(settings, self.rig.network, self.ring, self.rig.trigger.period_ns)
+        wanted = self.rig.cameras[0].model_copy(update={"trigger_input": self.input, **settings})
+        size = packet_size or self.rig.network.packet_size
+        network = self.rig.network.model_copy(update={"packet_size": size, "packet_delay": packet_delay})
+        camera = AravisCamera(wanted, network, self.ring, self.rig.trigger.period_ns)
         try:
             yield camera
         finally:
             camera.close()
+
+    def leave(self, values: Sequence[tuple[str, str | float]]) -> None:
+        """What another program has left behind, feature by feature; an enumeration's value by its name."""
+        with _controlled(self.rig.cameras[0].address) as device:
+            filling = _Filling(device, ET.Element("none"))
+            for name, value in values:
+                if isinstance(value, str):
+                    device.set_string_feature_value(name, value)
+                else:
+                    filling.set(name, value)
+
+    def lock(self, address: int, switch: int) -> None:
+        """Have the camera refuse to have an address written while there is 0 at another."""
+        registers = self._camera._device._registers
+        assert isinstance(registers, DescribedMap)
+        registers.refuses = lambda place: place == address and not any(registers.read(switch, 4))
 
     def start(self, camera: AravisCamera) -> None:
         """Start, and have the simulated sensor obey what the registers say now."""
@@ -107,11 +127,18 @@ def described(path: Path, folder: Path, loopback: Loopback) -> Iterator[Describe
 
 def _make(address: str, description: ET.Element) -> tuple[str, str]:
     """Fill the registers; names of an input and of a pixel format that the camera has then."""
+    with _controlled(address) as device:
+        return _Filling(device, description).run()
+
+
+@contextmanager
+def _controlled(address: str) -> Iterator[Any]:
+    """The camera, of which nothing is checked that is written."""
     device = Aravis.Camera.new(address).get_device()
     device.set_range_check_policy(Aravis.RangeCheckPolicy.DISABLE)
     device.set_access_check_policy(Aravis.AccessCheckPolicy.DISABLE)
     try:
-        return _Filling(device, description).run()
+        yield device
     finally:
         device.leave_control()
 
@@ -128,14 +155,14 @@ class _Filling:
         for name in names:
             self._allow(self._nodes[name], name)
         for name, value in _NUMBERS.items():
-            self._set(name, value)
+            self.set(name, value)
         for name in names:
             if _kind(self._nodes[name]) == "Enumeration":
                 self._choose(name)
             elif (bounds := self._features.bounds(name)) is not None and bounds[0] >= bounds[1]:
                 self._widen(name)
         for name, value in _NUMBERS.items():
-            self._set(name, value)
+            self.set(name, value)
         formats = self._features.entries("PixelFormat")
         eight_bits = [each for each in formats if each in FORMATS and FORMATS[each].frame_bytes(8, 1) == 8]
         return self._input(), "Mono8" if "Mono8" in eight_bits or not eight_bits else eight_bits[0]
@@ -147,7 +174,7 @@ class _Filling:
     def _is_feature(self, name: str) -> bool:
         return isinstance(self._device.get_feature(name), Aravis.GcFeatureNode)
 
-    def _set(self, name: str, value: float) -> None:
+    def set(self, name: str, value: float) -> None:
         """Write a node by its kind, as far as it can be written."""
         with suppress(GLib.Error):
             node = self._device.get_feature(name)
@@ -165,7 +192,7 @@ class _Filling:
             if kind in {"pIsImplemented", "pIsAvailable"}:
                 self._turn(target, lambda: bool(self._device.is_feature_available(name)), (1, _ONES))
             elif kind == "pIsLocked":
-                self._set(target, 0)
+                self.set(target, 0)
 
     def _turn(self, target: str, done: Any, values: tuple[int, ...]) -> None:
         """Write a node, or those that its formula is made of, until it says what it should."""
@@ -178,7 +205,7 @@ class _Filling:
                 if done():
                     return
             for each in variables or [target]:
-                self._set(each, value)
+                self.set(each, value)
 
     def _choose(self, name: str) -> None:
         """Give an enumeration one of its values, unless it has one."""
@@ -195,7 +222,7 @@ class _Filling:
     def _widen(self, name: str) -> None:
         for child in self._nodes[name]:
             if _kind(child) == "pMax":
-                self._set((child.text or "").strip(), _LARGE)
+                self.set((child.text or "").strip(), _LARGE)
 
 
 def _kind(element: ET.Element) -> str:

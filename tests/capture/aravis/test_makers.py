@@ -205,7 +205,7 @@ def test_a_camera_whose_exposure_mode_is_unknown_is_refused_with_what_is_true(
         ),
         (Maker.BASLER, {"gain_db": 6.0}, ["input waits 10 us", "its gain has no unit (GainRaw, 0 to 500)"]),
         (Maker.BASLER, {"gain_raw": 501}, ["input waits 10 us", "its GainRaw is 500, not 501 (it takes 0 to 500)"]),
-        (Maker.STANDARD, {"gain_raw": 5}, ["it has no GainRaw, so gain_raw sets nothing: use gain_db"]),
+        (Maker.STANDARD, {"gain_raw": 5}, ["it has no gain in steps, so gain_raw sets nothing: use gain_db"]),
     ],
     indirect=["made"],
 )

@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench corpus test test-long check style wheel bundle install rollback uninstall lock client-tool docs clean setup system
+.PHONY: help demo run bench corpus test test-long check style wheel lowest bundle install rollback uninstall lock client-tool docs clean setup system
 
 # Some environments forbid Python to keep what it compiled: then each of the thousands of processes of the tests, and each
 # call of pytest, would compile the program anew.
@@ -59,6 +59,9 @@ style: setup
 wheel: setup ## build a wheel and try it in an empty environment outside the checkout
 	@.ci/try-wheel
 
+lowest: system ## the demo with the lowest versions of all packages that pyproject.toml names; newest ones for Python 3.11 to 3.14
+	@.ci/try-versions
+
 bundle: setup ## an archive in dist/, from which a computer without network, compiler or checkout installs Svev
 	@systemd/archive dist
 
@@ -72,7 +75,7 @@ uninstall: ## remove all versions from PREFIX; keep configuration and recordings
 	@systemd/uninstall "$(PREFIX)"
 
 lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
-	@test -x build/uv/bin/uv || { /usr/bin/python3 -m venv build/uv && build/uv/bin/pip install -qq uv; }
+	@.ci/get-uv
 	@build/uv/bin/uv pip compile pyproject.toml --group dev --python-version 3.11 --quiet --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --output-file requirements.lock $(ARGS)
 	@build/uv/bin/uv pip compile .ci/docs/requirements.in --python-version 3.11 --quiet --generate-hashes \

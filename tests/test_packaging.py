@@ -1,6 +1,8 @@
 """What travels in the wheel: the rooms, their data, and nothing that they need is undeclared."""
 
 import ast
+import json
+import os
 import re
 import shutil
 import subprocess
@@ -11,6 +13,12 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+
+from svev import cli
+from tests.service.serving import serving
+from tests.support.loopback import Loopback
+from tests.support.rigs import write_rig
+from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -83,3 +91,99 @@ def test_every_dependency_is_locked_with_hashes() -> None:
     assert {_normal(re.split(r"[ <>=!~;\[]", line)[0]) for line in wanted} <= names
     entries = re.split(r"^(?=[A-Za-z0-9._-]+==)", locked, flags=re.MULTILINE)[1:]
     assert all("--hash=sha256:" in entry for entry in entries)
+
+
+@pytest.mark.parametrize("home", ["", "https://example.org/svev"])
+def test_an_index_shows_the_readme_with_links_that_lead_somewhere(tmp_path: Path, home: str) -> None:
+    project = tmp_path / "project"
+    project.mkdir()
+    text = (ROOT / "pyproject.toml").read_text()
+    (project / "pyproject.toml").write_text(text.replace('home = ""', f'home = "{home}"'))
+    for name in ("README.md", "LICENSE", "hatch_build.py"):
+        shutil.copy(ROOT / name, project)
+    command = [sys.executable, "-m", "hatchling", "metadata"]
+    done = subprocess.run(command, cwd=project, capture_output=True, text=True, timeout=60, check=True)
+    told = json.loads(done.stdout)
+    links = re.findall(r"\]\(([^)]+)\)", told["readme"]["text"])
+    assert all(link.startswith("https://") for link in links)
+    assert ("https://example.org/svev/raw/main/docs/images/report.jpg" in links) is bool(home)
+    assert ("https://example.org/svev/blob/main/docs/index.md" in links) is bool(home)
+    assert all(url.startswith(home) for url in told.get("urls", {}).values())
+    assert ("Homepage" in told.get("urls", {})) is bool(home)
+    assert "Operating System :: POSIX :: Linux" in told["classifiers"]
+
+
+def test_one_module_starts_programs_of_ours_and_leaves_the_present_folder_out() -> None:
+    # Users have files of our names, which would be imported in our stead.
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            if path != ROOT / "rig" / "transport" / "launcher.py":
+                assert "sys.executable" not in path.read_text(), path
+
+
+@pytest.fixture
+def shadowed(tmp_path: Path) -> Path:
+    """A folder with a file of each of our names, none of which can be imported."""
+    for package in PACKAGES:
+        (tmp_path / f"{package}.py").write_text(f'raise SystemExit("{package}.py of the user was imported")\n')
+    return tmp_path
+
+
+def _called(folder: Path, *words: str, environment: dict[str, str] | None = None) -> "subprocess.CompletedProcess[str]":
+    """Run the installed command in a folder."""
+    command = [str(Path(sys.executable).with_name("svev")), *words]
+    own = {**os.environ, "PYTHONPATH": str(ROOT), **(environment or {})}
+    return subprocess.run(command, cwd=folder, env=own, capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", sorted(cli._COMMANDS))
+def test_every_command_starts_beside_files_of_our_names(shadowed: Path, command: str) -> None:
+    done = _called(shadowed, command, "--help")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.long
+def test_every_child_starts_beside_files_of_our_names(
+    shadowed: Path, loopback: Loopback, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Simulated cameras, grabbers, recorder, and those of a service: its exports for instance."""
+    rig = write_rig(shadowed, loopback, backend="aravis")
+    recorded = _called(shadowed, "record", "--rig", str(rig), "--seconds", "2", "--out", "out", "--json")
+    assert "was imported" not in recorded.stderr
+    log = json.loads(recorded.stdout)["log"]
+    exported = _called(shadowed, "export", log, "--out", "film.mp4")
+    assert exported.returncode == 0, exported.stderr
+    monkeypatch.chdir(shadowed)
+    with serving(shadowed, rig, loopback) as running:
+        running.arm()
+        recording = running.post("/api/recordings", {})["id"]
+        running.await_pulses(5)
+        running.post(f"/api/recordings/{recording}/stop")
+        running.await_state("armed")
+        status, asked = running.call("POST", f"/api/recordings/{recording}/exports", {})
+        assert status == 202, asked
+        export = f"/api/exports/{asked['id']}"
+        wait_until(lambda: running.get(export)["state"] in {"done", "failed"}, "the export is done", timeout_s=60.0)
+        assert running.get(export)["state"] == "done"
+
+
+@pytest.mark.parametrize("words", [("cameras", "show", "127.0.0.1"), ("record",), ("demo", "--seconds", "1")])
+def test_without_aravis_one_sentence_says_what_to_install(
+    tmp_path: Path, loopback: Loopback, words: tuple[str, ...]
+) -> None:
+    (tmp_path / "gi.py").write_text("raise ModuleNotFoundError(\"No module named 'gi'\")\n")
+    if words == ("record",):
+        rig = write_rig(tmp_path, loopback, backend="aravis")
+        words = (*words, "--rig", str(rig), "--seconds", "1", "--out", "out")
+    done = _called(tmp_path, *words, environment={"PYTHONPATH": f"{tmp_path}:{ROOT}"})
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    (said,) = [line for line in done.stderr.splitlines() if "Aravis" in line]
+    assert "GigE Vision cameras need Aravis, which cannot be loaded (No module named 'gi'): run sudo apt-get" in said
+
+
+def test_cameras_are_listed_without_aravis(tmp_path: Path) -> None:
+    (tmp_path / "gi.py").write_text("raise ModuleNotFoundError(\"No module named 'gi'\")\n")
+    done = _called(tmp_path, "cameras", "list", "--interface", "lo", environment={"PYTHONPATH": f"{tmp_path}:{ROOT}"})
+    assert (done.returncode, done.stderr) == (0, "")

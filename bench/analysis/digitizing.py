@@ -5,7 +5,6 @@ long journal. They are called in turn.
 """
 
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -25,6 +24,7 @@ from recorder.reading.info import info
 from rig.api.digitizing import MarkState
 from rig.arrays import Floats
 from rig.errors import ProcessDiedError
+from rig.transport.launcher import program_command
 from simrig.world.scenario import Scenario, load_scenario
 
 _SCENARIO: Final = Path("config/scenarios/training.toml")
@@ -167,7 +167,7 @@ def _taken(times_s: Floats) -> list[_Taken]:
 
 @contextmanager
 def _served(log: HillLog, folder: Path) -> Iterator[_Server]:
-    command = [sys.executable, "-m", "svev", "digitize", str(log.path), "--survey", str(log.survey)]
+    command = [*program_command("svev"), "digitize", str(log.path), "--survey", str(log.survey)]
     process = subprocess.Popen([*command, "--marks", str(folder)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None  # noqa: S101 - a pipe was asked for
     try:

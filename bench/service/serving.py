@@ -3,7 +3,6 @@
 import os
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ import httpx
 from recorder.publishing.subscriber import free_address
 from rig.errors import ProcessDiedError
 from rig.settings.file import CONFIG
+from rig.transport.launcher import program_command
 
 _START_S: Final = 60.0
 _STOP_S: Final = 30.0
@@ -102,7 +102,7 @@ def served_rig(folder: Path, tables: str = "") -> Iterator[ServedRig]:
     scenario, _, cameras = rest.partition("\n\n")
     tables = tables or f"[simulation]\n{scenario}\n"
     rig.write_text(f'{head}[network]\npublish = "{free_address()}"\n\n{tables}\n{cameras}')
-    command = [sys.executable, "-m", "svev", "serve", "--rig", str(rig), "--port", str(port), "--data", str(folder)]
+    command = [*program_command("svev"), "serve", "--rig", str(rig), "--port", str(port), "--data", str(folder)]
     with (folder / "service.log").open("w") as log, subprocess.Popen(command, stdout=log, stderr=log) as process:
         service = ServedRig(process.pid, port, folder)
         try:

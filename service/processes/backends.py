@@ -72,10 +72,12 @@ def check_backends(rig: RigSettings) -> None:
     """Check that all cameras of a rig can be driven on this computer.
 
     Raises:
-        BadInputError: libdc1394 is missing, a FireWire bus has no room for its cameras, or a log that is to be replayed
-            is missing or does not fit the rig file.
+        BadInputError: Aravis or libdc1394 is missing, a FireWire bus has no room for its cameras, or a log that is to
+            be replayed is missing or does not fit the rig file.
     """
     backends = {camera.backend for camera in rig.cameras}
+    if "aravis" in backends:
+        import capture.aravis.library  # noqa: F401, PLC0415 - it says what is missing
     if "iidc" in backends:
         from capture.iidc.bandwidth import check_bandwidth  # noqa: PLC0415
         from capture.iidc.library import load as load_libdc1394  # noqa: PLC0415

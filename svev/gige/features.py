@@ -5,16 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-import gi
-
 from capture.aravis.features import text_at
+from capture.aravis.library import Aravis, GLib
 from rig.errors import CameraError, CameraNotFoundError
-
-gi.require_version("Aravis", "0.8")
-from gi.repository import Aravis, GLib  # noqa: E402  (the version must be required first)
-
-for _interface in ("USB3Vision", "Fake"):
-    Aravis.disable_interface(_interface)
 
 #: What Aravis gives as the upper bound of a number without one.
 _NO_LIMIT: Final = frozenset({sys.float_info.max, float("inf"), 2**63 - 1, 2**32 - 1})

@@ -1,5 +1,6 @@
 """`svev cameras`: lists GigE Vision cameras, shows their features, gives them addresses."""
 
+from collections.abc import Callable
 from dataclasses import asdict
 from ipaddress import IPv4Address
 from itertools import groupby
@@ -11,7 +12,6 @@ import typer
 from rig.errors import BadInputError, CameraError
 from rig.settings.file import load_rig
 from svev import console
-from svev.gige.features import features, keep_address
 from svev.gige.gvcp import FoundCamera, ask_camera, ask_cameras, find_cameras, force_address
 
 app = typer.Typer(
@@ -83,6 +83,8 @@ def show(
 
     Example: svev cameras show 192.168.11.2
     """
+    from svev.gige.features import features  # noqa: PLC0415 - listing cameras needs no Aravis
+
     found = features(_address(address).exploded)
     if as_json:
         console.print_json({"address": address, "features": [asdict(feature) for feature in found]})
@@ -114,14 +116,15 @@ def set_ip(
 
     Example: svev cameras set-ip DEV_000F31021A2B 192.168.11.2
     """
+    keep = None if temporary else _keeper()
     found, wanted = find_cameras(interface), _address(address)
     chosen = _choose(camera, found)
     _check_address(wanted, chosen)
     force_address(chosen.camera.mac, chosen.interface, wanted)
     mask = str(chosen.interface.network.netmask)
     now = _look_again(chosen, wanted)
-    if not temporary:
-        keep_address(str(wanted), mask)
+    if keep is not None:
+        keep(str(wanted), mask)
     if as_json:
         console.print_json(_as_json(now) | {"kept": not temporary})
     else:
@@ -134,6 +137,13 @@ def _address(text: str) -> IPv4Address:
         return IPv4Address(text)
     except ValueError:
         raise BadInputError(f"{text}: is no IPv4 address; give one such as 192.168.11.2") from None
+
+
+def _keeper() -> Callable[[str, str], None]:
+    """What has a camera keep its address; without Aravis it is refused before the address changes."""
+    from svev.gige.features import keep_address  # noqa: PLC0415 - see `show`
+
+    return keep_address
 
 
 def _choose(which: str, found: list[FoundCamera]) -> FoundCamera:

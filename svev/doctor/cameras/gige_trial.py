@@ -4,10 +4,9 @@ from collections.abc import Iterator
 from contextlib import closing
 from typing import Final
 
-from capture.aravis.camera import AravisCamera
 from capture.aravis.wire import Wire
 from rig.clocks import host_now
-from rig.errors import CameraError, CameraNotFoundError
+from rig.errors import BadInputError, CameraError
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from rig.transport.child import begin
@@ -25,10 +24,12 @@ def try_camera(rig: RigSettings, settings: CameraSettings) -> Iterator[Finding]:
     wire = Wire.to(settings.address, [each.address for each in rig.cameras if each.backend == "aravis"])
     with closing(CameraRing.create(name, settings.frame_bytes, _SLOTS)) as ring:
         try:
+            from capture.aravis.camera import AravisCamera  # noqa: PLC0415 - it may be that Aravis is missing
+
             opened = AravisCamera(
                 settings, rig.network, ring, trigger.period_ns, trigger, host_now(), wire, set_back=True
             )
-        except (CameraError, CameraNotFoundError) as error:
+        except (CameraError, BadInputError) as error:
             what, _, remedy = str(error).removeprefix("camera ").partition(": ")
             remedy = remedy or "look at svev cameras show {address}"
             yield failure(

@@ -2,13 +2,15 @@
 
 from pathlib import Path
 
-from analysis.export import c3d_file, table, trc_file
+from analysis.export import c3d_file, osim_file, table, trc_file
 from analysis.export.places import SKI_LENGTH_M
 from analysis.result.model import MeasuredRecording
 
 
 def write(result: MeasuredRecording, folder: Path, ski_length_m: float = SKI_LENGTH_M) -> list[Path]:
     """Write `jumper.csv`, `jumper.c3d` and `jumper.trc`; a second jump is in `jumper-2.c3d` and `jumper-2.trc`.
+
+    Beside them `jumper.osim` is the model for all TRC files, if there are any.
 
     Returns:
         The files written.
@@ -25,4 +27,7 @@ def write(result: MeasuredRecording, folder: Path, ski_length_m: float = SKI_LEN
             written += [folder / f"{name}.c3d", folder / f"{name}.trc"]
             c3d_file.write(jump, result.rate_hz, cameras, written[-2], ski_length_m)
             trc_file.write(jump, result.rate_hz, written[-1], ski_length_m)
+    if len(written) > 1:
+        written.append(folder / "jumper.osim")
+        osim_file.write(written[-1], ski_length_m)
     return written

@@ -5,6 +5,7 @@ import io
 import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import c3d
 import ezc3d
@@ -29,7 +30,7 @@ def measured() -> MeasuredRecording:
 def folder(measured: MeasuredRecording, tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("motion")
     names = [path.name for path in motion_files.write(measured, place)]
-    assert names == ["jumper.csv", "jumper.c3d", "jumper.trc", "jumper-2.c3d", "jumper-2.trc"]
+    assert names == ["jumper.csv", "jumper.c3d", "jumper.trc", "jumper-2.c3d", "jumper-2.trc", "jumper.osim"]
     return place
 
 
@@ -195,6 +196,52 @@ def test_the_trc_file_read_by_tabs(measured: MeasuredRecording, folder: Path) ->
             else:
                 x, y, z = (float(cell) for cell in cells)
                 assert (x, -z, y) == pytest.approx(point.xyz, abs=1e-5)  # Y is up, handedness kept
+
+
+def test_the_model_beside_the_trc_files_has_their_markers(folder: Path) -> None:
+    markers = {each.get("name"): each for each in ET.parse(folder / "jumper.osim").iter("Marker")}  # noqa: S314 - ours
+    for name in ("jumper.trc", "jumper-2.trc"):
+        labels = [cell for cell in (folder / name).read_text(encoding="utf-8").split("\n")[3].split("\t")[2:] if cell]
+        assert sorted(labels) == sorted(name for name in markers if name)
+    for side, binding in (("right", "P3"), ("left", "P4")):
+        places = [markers[f"{label}_s"].findtext("location") for label in (f"{side}_tail", binding, f"{side}_tip")]
+        assert places == ["-1.3150 0 0", "0.0000 0 0", "1.3150 0 0"]
+
+
+def test_opensim_reads_model_and_points_and_finds_the_skis(
+    measured: MeasuredRecording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opensim = pytest.importorskip("opensim", reason="opensim is not installed")
+    opensim.Logger.removeFileSink()
+    monkeypatch.chdir(tmp_path)
+    whole = [
+        pulse
+        for pulse in measured.jumps[0].pulses
+        if pulse.smoothed is not None and len(of_state(pulse.raw)) == len(of_state(pulse.smoothed)) == len(LABELS)
+    ]
+    run = [pulse for number, pulse in enumerate(whole) if pulse.pulse == whole[0].pulse + number]
+    jump = replace(measured.jumps[0], pulses=tuple(run))
+    motion_files.write(replace(measured, jumps=(jump,)), tmp_path)
+    tool = opensim.InverseKinematicsTool()
+    model = opensim.Model("jumper.osim")
+    tool.setModel(model)
+    tool.setMarkerDataFileName("jumper.trc")
+    tool.setStartTime(0.0)
+    tool.setEndTime((len(run) - 1) / 30)
+    tool.setOutputMotionFileName("jumper.mot")
+    assert tool.run()
+    motion = opensim.TimeSeriesTable("jumper.mot")
+    assert motion.getNumRows() == len(run) > 3
+    names, state = list(motion.getColumnLabels()), run[0].smoothed
+    first = dict(zip(names, motion.getRowAtIndex(0).to_numpy(), strict=True))
+    assert state is not None
+    ski, helmet = state.skis["right"], state.points["P1"]
+    assert ski is not None
+    assert helmet is not None
+    assert first["right_ski_rz"] == pytest.approx(ski.slope.value, abs=1.0)  # degrees
+    assert [first[f"helmet_t{axis}"] for axis in "xyz"] == pytest.approx(
+        [helmet.xyz[0], helmet.xyz[2], -helmet.xyz[1]], abs=0.05
+    )
 
 
 def test_the_table(measured: MeasuredRecording, folder: Path) -> None:

@@ -1,7 +1,8 @@
 """Collects the licences of all wheels of a bundle, and says under which terms the whole stands: licences.py BUNDLE.
 
 A wheel may hold libraries of others that its own licence does not name (`*.libs/`). Some of them are under the GPL
-(x264, x265), and so is then the whole that is passed on.
+(x264, x265), and so is then the whole that is passed on. A wheel without the text of its licence gets the common one,
+with its author above.
 """
 
 import re
@@ -15,6 +16,11 @@ from pathlib import Path
 COPYLEFT = ("libx264", "libx265", "libxvidcore", "libpostproc")
 _TEXTS = re.compile(r"[^/]+\.dist-info/(licenses/.+|(LICEN[CS]E|COPYING|NOTICE|AUTHORS)[^/]*)", re.IGNORECASE)
 _LIBRARY = re.compile(r"(?:^|/)(lib[A-Za-z0-9_+]+)[^/]*\.so[^/]*$")
+#: The tag by which a source file names its licence.
+_TAG = re.compile(rb"SPDX-License-Identifier: *([A-Za-z0-9.-]+)")
+#: Classifiers that name one licence alone.
+_CLASSIFIED = {"MIT License": "MIT", "MIT": "MIT"}
+COMMON = Path(__file__).parent / "licence-texts"
 #: Where Debian keeps the text.
 GPL = Path("/usr/share/common-licenses/GPL-3")
 
@@ -56,7 +62,25 @@ def _row(wheel: zipfile.ZipFile, folder: Path) -> tuple[str, str]:
     texts = [each for each in wheel.namelist() if _TEXTS.fullmatch(each) and not each.endswith("/")]
     for each in texts:
         (place / each.partition("/")[2].replace("/", "-")).write_bytes(wheel.read(each))
-    return name, f"{name}: {_stated(fields)}" + ("" if texts else " (the wheel holds no text)")
+    if not texts:
+        (place / "LICENCE").write_text(_common(wheel, fields, name), encoding="utf-8")
+    return name, f"{name}: {_stated(fields)}" + ("" if texts else " (the wheel holds no text; the common one is added)")
+
+
+def _common(wheel: zipfile.ZipFile, fields: Message, name: str) -> str:
+    """The text of the licence of a wheel that holds none."""
+    stated = fields["License-Expression"] or _CLASSIFIED.get(_stated(fields))
+    if stated is None:  # "BSD License" are several
+        sources = [each for each in wheel.namelist() if each.endswith(".py")]
+        tags = {tag.decode() for each in sources for tag in _TAG.findall(wheel.read(each))}
+        stated = tags.pop() if len(tags) == 1 else ""
+    text = COMMON / stated
+    if not text.is_file():
+        sys.exit(f"{name} holds no text of its licence ({_stated(fields)}): add the common one to {COMMON}")
+    author = fields["Author"] or fields["Author-email"] or f"the authors of {fields['Name']}"
+    page = fields["Home-page"] or ", ".join(fields.get_all("Project-URL", []))
+    said = f"{name} ({page}) holds no text of its licence, and names it {stated}."
+    return f"{said}\n\nCopyright (c) {author}\n\n{text.read_text(encoding='utf-8')}"
 
 
 def _stated(fields: Message) -> str:

@@ -34,20 +34,42 @@ def _said(bundle: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_every_wheel_has_its_line_and_its_texts(bundle: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _wheel(bundle, "bare", "License: Apache 2.0")
     said = _said(bundle, monkeypatch)
     assert "plain 1.0: MIT\n" in said
     assert "old 1.0: BSD License\n" in said
-    assert "bare 1.0: Apache 2.0 (the wheel holds no text)\n" in said
     assert (bundle / "licences" / "plain-1.0" / "licenses-LICENSE").read_text().startswith("text of plain")
     assert (bundle / "licences" / "old-1.0" / "LICENSE.txt").exists()
     assert "No library under the GPL" in said
     assert not (bundle / "licences" / "GPL-3").exists()
 
 
+def test_a_wheel_without_text_gets_the_common_one(bundle: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _wheel(bundle, "bare", "Author: Foxes\nClassifier: License :: OSI Approved :: MIT License")
+    _wheel(bundle, "tagged", "License: BSD", "tagged/a.py")
+    with zipfile.ZipFile(bundle / "wheels" / "tagged-1.0-py3-none-any.whl", "a") as wheel:
+        wheel.writestr("tagged/b.py", "# SPDX-License-Identifier:    BSD-3-Clause\n")
+    said = _said(bundle, monkeypatch)
+    assert "bare 1.0: MIT License (the wheel holds no text; the common one is added)\n" in said
+    text = (bundle / "licences" / "bare-1.0" / "LICENCE").read_text()
+    assert "Copyright (c) Foxes" in text
+    assert "Permission is hereby granted, free of charge" in text
+    assert "Neither the name of the copyright holder" in (bundle / "licences" / "tagged-1.0" / "LICENCE").read_text()
+
+
+def test_a_licence_whose_text_is_nowhere_stops_the_bundle(bundle: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _wheel(bundle, "bare", "License: Something else")
+    with pytest.raises(SystemExit, match=r"bare 1\.0 holds no text of its licence \(Something else\)"):
+        _said(bundle, monkeypatch)
+
+
 def test_a_library_under_the_gpl_decides_for_the_whole(bundle: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _wheel(
-        bundle, "av", "License-Expression: BSD-3-Clause", "av.libs/libx264-d6533a8d.so.165", "av.libs/libopus-1.so.0"
+        bundle,
+        "av",
+        "License-Expression: BSD-3-Clause",
+        "av-1.0.dist-info/licenses/LICENSE",
+        "av.libs/libx264-d6533a8d.so.165",
+        "av.libs/libopus-1.so.0",
     )
     said = _said(bundle, monkeypatch)
     assert "under the GNU General Public License, version 3 or later" in said

@@ -14,6 +14,8 @@ from capture.aravis.library import Aravis, GLib
 _NO_FEATURES: Final = (Aravis.GcCategory, Aravis.GcPort)
 
 
+#: A step of a number that is smaller is none: Aravis has the least number of all for it.
+_NO_STEP: Final = 1e-12
 _ON: Final = ("On", "Continuous", "True", "Enable", "Enabled")
 _OFF: Final = ("Off", "False", "Disable", "Disabled")
 
@@ -163,7 +165,10 @@ class Features:
             self.remember(name)
             if isinstance(self._device.get_feature(name), Aravis.GcFloat):
                 low, high = self._device.get_float_feature_bounds(name)
-                self._write(name, min(max(value, low), high))
+                value, step = min(max(value, low), high), self._float_step(name)
+                if step > 0:
+                    value = low + step * min(round((value - low) / step), math.floor((high - low) / step))
+                self._write(name, value)
             else:
                 low, high = self._device.get_integer_feature_bounds(name)
                 step = max(1, self._device.get_integer_feature_increment(name))
@@ -173,6 +178,14 @@ class Features:
         except GLib.Error:
             return None
         return self.number(name)
+
+    def _float_step(self, name: str) -> float:
+        """Step of a float; 0 if it has none, as most."""
+        try:
+            step = float(self._device.get_float_feature_increment(name))
+        except GLib.Error:  # there is no such node
+            return 0.0
+        return step if step > _NO_STEP else 0.0
 
     def unit(self, name: str) -> str:
         """Unit of a number; empty if none is told."""

@@ -129,6 +129,8 @@ def _set_input(features: Features, settings: CameraSettings) -> list[str]:
         notices.append(f"it takes pulses at any of its inputs, not only at {wanted}")
     if features.choose("LineSelector", wanted):
         features.choose("LineMode", "Input")
+        if features.has("LineInverter") and not features.switch("LineInverter", on=False):
+            notices.append("its input is turned round (LineInverter): it exposes at the other edge of a pulse")
         debouncer = features.first_number(*_DEBOUNCERS)
         if debouncer is not None and (wait := features.number(debouncer)):
             notices.append(f"its input waits {wait:g} us for a steady level ({debouncer}): it exposes so much later")

@@ -227,6 +227,18 @@ KINDS = {
         settings={"exposure_us": 500.0},
         wanted={"ExposureTimeAbs": 497},
     ),
+    "exposure is a float with steps": Kind(
+        _number("ExposureTime", 0x20000, (20.0, 100_000.0, 14.8), real=True),
+        instead=("ExposureTime",),
+        settings={"exposure_us": 500.0},
+        wanted={"ExposureTime": 493.6},
+    ),
+    "the input is turned round by another program (FLIR, Basler)": Kind(
+        _enumeration("LineSelector", ("Line1", "Line0"), 0x20000) + _boolean("LineInverter", 0x20100),
+        left=(("LineInverter", 1),),
+        settings={"trigger_input": "Line0"},
+        wanted={"LineSelector": "Line0", "LineInverter": 0},
+    ),
     "the input waits under the maker's own name (Teledyne Dalsa)": Kind(
         _enumeration("LineSelector", ("Line0", "Line1"), 0x20000) + _number("lineDebouncingPeriod", 0x20100, (0, 255)),
         left=(("lineDebouncingPeriod", 40),),

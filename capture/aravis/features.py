@@ -5,6 +5,7 @@ Nothing here raises because a feature is missing or refuses a value: the caller 
 
 import ctypes
 import math
+import re
 from contextlib import suppress
 from typing import Final
 
@@ -99,11 +100,14 @@ class Features:
     def choose(self, name: str, *entries: str) -> str | None:
         """Set an enumeration to the first of these values that it takes, or already has.
 
+        Makers write the same name as RisingEdge, Rising_Edge or RISINGEDGE.
+
         Returns:
-            The value; None if there is no such feature, no such value, or the camera refuses.
+            The value, as it was asked for; None if there is no such feature, no such value, or the camera refuses.
         """
-        there = self.entries(name)
-        return next((entry for entry in entries if entry in there and self._becomes(name, entry)), None)
+        there = {_plain(entry): entry for entry in self.entries(name)}
+        known = ((entry, there[_plain(entry)]) for entry in entries if _plain(entry) in there)
+        return next((entry for entry, its in known if self._becomes(name, its)), None)
 
     def _becomes(self, name: str, entry: str) -> bool:
         """Set an enumeration that has the value not already: many can only be read, or have one value."""
@@ -255,6 +259,11 @@ class Features:
         except GLib.Error:
             return False
         return True
+
+
+def _plain(entry: str) -> str:
+    """A name of an enumeration's value without capitals and signs."""
+    return re.sub(r"[^a-z0-9]", "", entry.lower())
 
 
 def text_at(device: "Aravis.Device", address: int, length: int) -> str:

@@ -239,6 +239,14 @@ KINDS = {
         settings={"trigger_input": "Line0"},
         wanted={"LineSelector": "Line0", "LineInverter": 0},
     ),
+    "names are written in other ways (Emergent, Sony)": Kind(
+        _enumeration("TriggerActivation", ("Falling_Edge", "Rising_Edge"), 0x20000)
+        + _enumeration("TriggerSource", ("SOFTWARE", "LINE_1", "LINE_2"), 0x20100)
+        + _enumeration("TriggerMode", ("OFF", "ON"), 0x20200),
+        instead=("TriggerActivation", "TriggerSource", "TriggerMode"),
+        settings={"trigger_input": "Line2"},
+        wanted={"TriggerActivation": "Rising_Edge", "TriggerSource": "LINE_2", "TriggerMode": "ON"},
+    ),
     "the input waits under the maker's own name (Teledyne Dalsa)": Kind(
         _enumeration("LineSelector", ("Line0", "Line1"), 0x20000) + _number("lineDebouncingPeriod", 0x20100, (0, 255)),
         left=(("lineDebouncingPeriod", 40),),

@@ -1,4 +1,5 @@
-# Svev. `make demo` and `make test` set up everything that they need on a fresh Debian 12, the first time.
+# Svev. `make demo` and `make test` set up everything that they need on a fresh Debian 12, the first time
+# (`make demo` on Debian 13 too).
 # ARGS is passed to the program that the target runs:  make test ARGS="tests/rig -x"   make demo ARGS="--seconds 5"
 
 SHELL := /bin/bash

@@ -42,6 +42,7 @@ RECORDING_METADATA: Final = "svev.recording"
 RECOVERY_METADATA: Final = "svev.recovery"
 MERGE_METADATA: Final = "svev.merge"
 IMPORT_METADATA: Final = "svev.import"
+COMPACT_METADATA: Final = "svev.compact"
 #: What went wrong while the log was written, by where it went wrong, e.g. "disk".
 TROUBLE_METADATA: Final = "svev.trouble"
 RIG_ATTACHMENT: Final = "rig.toml"

@@ -48,6 +48,7 @@ _COMMANDS: Final = {
     "info": ("logs.contents", "info_command", "Say what a log holds."),
     "export": ("logs.export", "export_command", "Make a video, pictures or a table of a log."),
     "recover": ("logs.contents", "recover_command", "Repair a log that was not closed or is damaged."),
+    "compact": ("logs.compact", "compact_command", "Make a log half as large, without loss."),
     "merge": ("logs.merge", "merge_command", "Make one log of two that two computers recorded."),
     "import": ("logs.importing", "import_command", "Make a log of films that other cameras took."),
     "replay": ("logs.replay", "replay_command", "Publish a log again, as it was published live."),

@@ -23,6 +23,7 @@ from mcap.opcode import Opcode
 from mcap.records import McapRecord
 
 from recorder.log.crc import combined_crc
+from recorder.log.protobuf import varint
 from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.images.pixels import MONO8, Pixels
@@ -103,13 +104,25 @@ def chunk_of_one(
     channel: int, sequence: int, data: bytes, publish_time: UtcNs, log_time: UtcNs
 ) -> tuple[bytes, ChunkPlan]:
     """The bytes of a chunk with one message, and of its index, without padding."""
-    head = _message_head(channel, sequence, len(data), publish_time, log_time)
-    size = len(head) + len(data)
-    chunk = _chunk_head(log_time, size, crc32(data, crc32(head))) + head + data
-    index = _index(channel, log_time, 0)
-    whole = chunk + index
-    return whole, ChunkPlan(
-        0, len(chunk), size, log_time, ((channel, len(chunk)),), len(index), len(whole), crc32(whole)
+    return chunk_of(log_time, [(channel, message_head(channel, sequence, len(data), publish_time, log_time) + data)])
+
+
+def chunk_of(log_time: UtcNs, messages: Sequence[tuple[int, bytes]]) -> tuple[bytes, ChunkPlan]:
+    """The bytes of a chunk, and of its indexes, without padding.
+
+    Args:
+        log_time: of all messages, UTC.
+        messages: channel and record of each; a channel has one message at most.
+    """
+    content = b"".join(record for _, record in messages)
+    chunk = _chunk_head(log_time, len(content), crc32(content)) + content
+    whole, indexes, offset = bytearray(chunk), [], 0
+    for channel, record in messages:
+        indexes.append((channel, len(whole)))
+        whole += _index(channel, log_time, offset)
+        offset += len(record)
+    return bytes(whole), ChunkPlan(
+        0, len(chunk), len(content), log_time, tuple(indexes), len(whole) - len(chunk), len(whole), crc32(whole)
     )  # fmt: skip
 
 
@@ -199,7 +212,7 @@ class SlotLayout:
         Raises:
             ValueError: the tag does not fit before the pixels.
         """
-        tag_message = _message_head(TAG_CHANNEL, pulse, len(tag), pulse_time, log_time) + tag
+        tag_message = message_head(TAG_CHANNEL, pulse, len(tag), pulse_time, log_time) + tag
         before = tag_message
         positions = []  # of the image messages in the slot
         for image in self.images:
@@ -243,7 +256,7 @@ class SlotLayout:
         else:
             prefix = raw_image_prefix(shape, pulse_time, kind)
         data_bytes = len(prefix) + shape[0] * columns * self.kind.size
-        return _message_head(channel, pulse, data_bytes, pulse_time, log_time) + prefix
+        return message_head(channel, pulse, data_bytes, pulse_time, log_time) + prefix
 
 
 def raw_image_prefix(shape: tuple[int, int], time: UtcNs, kind: Pixels = MONO8) -> bytes:
@@ -251,7 +264,7 @@ def raw_image_prefix(shape: tuple[int, int], time: UtcNs, kind: Pixels = MONO8) 
     image = _raw_image(shape, "triplet", kind)
     image.timestamp.FromNanoseconds(time)
     head: bytes = image.SerializeToString()
-    return head + _data_field(shape, kind)
+    return head + pixels_field(shape, kind)
 
 
 def camera_image_prefix(shape: tuple[int, int], time: UtcNs, frame: str, kind: Pixels = MONO8) -> bytes:
@@ -260,10 +273,10 @@ def camera_image_prefix(shape: tuple[int, int], time: UtcNs, frame: str, kind: P
     The numbers of the time stamp are filled up with zero bits, which protobuf allows.
     """
     seconds, nanoseconds = divmod(time, NS_PER_S)
-    stamp = b"".join(bytes([field << 3]) + _varint(number, 5) for field, number in ((1, seconds), (2, nanoseconds)))
+    stamp = b"".join(bytes([field << 3]) + varint(number, 5) for field, number in ((1, seconds), (2, nanoseconds)))
     timestamp = bytes([RawImage.TIMESTAMP_FIELD_NUMBER << 3 | 2, len(stamp)]) + stamp
     head: bytes = _raw_image(shape, frame, kind).SerializeToString()
-    return timestamp + head + _data_field(shape, kind)
+    return timestamp + head + pixels_field(shape, kind)
 
 
 def _raw_image(shape: tuple[int, int], frame: str, kind: Pixels) -> RawImage:
@@ -271,9 +284,10 @@ def _raw_image(shape: tuple[int, int], frame: str, kind: Pixels) -> RawImage:
     return RawImage(frame_id=frame, width=shape[1], height=shape[0], encoding=kind.encoding, step=step)
 
 
-def _data_field(shape: tuple[int, int], kind: Pixels) -> bytes:
+def pixels_field(shape: tuple[int, int], kind: Pixels) -> bytes:
+    """What stands in a serialized `foxglove.RawImage` right before the pixels: number and length of their field."""
     length = shape[0] * shape[1] * kind.size
-    return bytes([RawImage.DATA_FIELD_NUMBER << 3 | 2]) + _varint(length)  # type 2: length, then bytes
+    return bytes([RawImage.DATA_FIELD_NUMBER << 3 | 2]) + varint(length)  # type 2: length, then bytes
 
 
 def join_pages(parts: Iterable[bytes]) -> mmap.mmap:
@@ -289,20 +303,11 @@ def _chunk_head(log_time: UtcNs, size: int, crc: int) -> bytes:
     return _CHUNK.pack(Opcode.CHUNK, _CHUNK.size - RECORD.size + size, log_time, log_time, size, crc, 0, size)
 
 
-def _message_head(channel: int, sequence: int, data_bytes: int, publish_time: UtcNs, log_time: UtcNs) -> bytes:
+def message_head(channel: int, sequence: int, data_bytes: int, publish_time: UtcNs, log_time: UtcNs) -> bytes:
+    """What stands in a message record before its data."""
     length = MESSAGE.size - RECORD.size + data_bytes
     return MESSAGE.pack(Opcode.MESSAGE, length, channel, sequence, log_time, publish_time)
 
 
 def _index(channel: int, log_time: UtcNs, offset: int) -> bytes:
     return _INDEX_OF_ONE.pack(Opcode.MESSAGE_INDEX, _INDEX_OF_ONE.size - RECORD.size, channel, 16, log_time, offset)
-
-
-def _varint(number: int, least: int = 1) -> bytes:
-    """Protobuf's variable-length integer: seven bits per byte, lowest first, in at least `least` bytes."""
-    out = bytearray()
-    while number > 0x7F or len(out) < least - 1:
-        out.append(number & 0x7F | 0x80)
-        number >>= 7
-    out.append(number)
-    return bytes(out)

@@ -16,6 +16,7 @@ from rig.host.utc_clock import UtcState
 from rig.phrase import Phrase
 from rig.tag import TripletTag
 from rig.topics import (
+    COMPACT_METADATA,
     HEALTH,
     IMPORT_METADATA,
     MERGE_METADATA,
@@ -50,6 +51,7 @@ class LogInfo:
         merged: of a log that was made of two: fields that say which, and how their clocks differed; empty otherwise.
         imported: of a log that was made of films: fields that say which, and that no trigger stands behind them; empty
             otherwise.
+        compacted: of a log whose images are coded: fields that say of which log, and how; empty otherwise.
         disk: what went wrong with the disk while the log was written; empty text if nothing.
         forgotten_s: after so many seconds the recording ended by itself, because nobody had stopped it; 0: otherwise.
         ended_early_said: why the log ends before its recording was to end, or that this is not known; empty text: as
@@ -75,6 +77,7 @@ class LogInfo:
     known_lost: tuple[tuple[int, int], ...]
     merged: dict[str, str]
     imported: dict[str, str]
+    compacted: dict[str, str]
     disk: Phrase
     forgotten_s: float
     ended_early_said: Phrase
@@ -145,6 +148,7 @@ class LogInfo:
             "utc": None if self.utc is None else asdict(self.utc),
             "merged": self.merged,
             "imported": self.imported,
+            "compacted": self.compacted,
             "trouble": self.trouble,
             "ended_early": self.ended_early,
             "part_before": self.part_before,
@@ -195,8 +199,9 @@ def info(path: Path, *, original: bool = False, source: bool = False, links: boo
         return LogInfo(
             path, reader.size, reader.closed, being_written, reader.truncated, damaged, torn, ledger, first, session,
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
-            reader.metadata.get(IMPORT_METADATA, {}), disk_trouble(reader.metadata), forgotten_s(reader.metadata),
-            ended_early_said(reader.metadata), part_before(reader.metadata, path), messages, reader.library,
+            reader.metadata.get(IMPORT_METADATA, {}), reader.metadata.get(COMPACT_METADATA, {}),
+            disk_trouble(reader.metadata), forgotten_s(reader.metadata), ended_early_said(reader.metadata),
+            part_before(reader.metadata, path), messages, reader.library,
             None if told is None else told.finish(),
         )  # fmt: skip
 
@@ -233,3 +238,9 @@ def imported_in_words(imported: Mapping[str, str]) -> str:
         f"imported from films, without a trigger: pulses are told by frame number from a common start by {start}; how "
         f"synchronous the cameras were is {synchrony}; the date is {date}"
     )
+
+
+def compacted_in_words(compacted: Mapping[str, str]) -> str:
+    """What a log says of the log that it was compacted from, in one line."""
+    source, size, codec = (compacted.get(key, "?") for key in ("source", "bytes", "codec"))
+    return f"from {source} ({size} bytes): every frame without loss, coded by {codec}"

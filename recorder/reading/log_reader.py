@@ -14,6 +14,7 @@ from mcap.records import Attachment, Channel, Header, Metadata
 
 from recorder.log.channels import schemas_and_channels
 from recorder.log.mcap_layout import FIRST_CAMERA_CHANNEL, MAGIC, MESSAGE, PADDING_OPCODE, RECORD
+from recorder.reading.coded_images import with_images
 from recorder.reading.items import Chunk, Item, Message, SmallRecord, printable
 from recorder.reading.records import CHUNK_HEAD, Damage, FileWindow, RawRecord, chunks_anywhere, is_closed, walk
 from rig.clocks import UtcNs
@@ -252,6 +253,8 @@ class LogReader:
             wrong = only is None and crc and not checked
             trouble = self._content(first, end, only, messages, declarations)
             flaw = "its checksum is wrong" if wrong else trouble
+        if only is None and not flaw:
+            messages, flaw = with_images(messages)
         return Chunk(
             record.offset, record.length, UtcNs(start_time), UtcNs(end_time), size,
             tuple(messages), tuple(declarations), flaw, crc, checked,

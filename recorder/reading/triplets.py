@@ -11,6 +11,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
 
 from recorder.log.mcap_layout import CHUNK_MAX, raw_image_prefix
+from recorder.log.protobuf import fields
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
 from rig.clocks import UtcNs
@@ -241,18 +242,14 @@ def view_image(message: memoryview) -> ImageView:
     Raises:
         ValueError: the bytes are no `foxglove.RawImage`.
     """
-    position, others, pixels = 0, bytearray(), memoryview(b"")
-    while position < len(message):
-        field = position
-        key, position = _varint(message, position)
-        if key < 8 or len(others) > _OTHERS_MAX:
-            raise ValueError("no foxglove.RawImage: no field, or too many")
-        length, position = _field_length(message, position, key & 7)
-        if key == _DATA_KEY:
-            pixels = message[position : position + length]
+    others, pixels = bytearray(), memoryview(b"")
+    for field in fields(message):
+        if len(others) > _OTHERS_MAX:
+            raise ValueError("no foxglove.RawImage: too many fields")
+        if field.key == _DATA_KEY:
+            pixels = message[field.content : field.end]
         else:
-            others += message[field : position + length]
-        position += length
+            others += message[field.begin : field.end]
     # Only the pixels are large: the library reads a copy of all other fields.
     try:
         image = RawImage.FromString(bytes(others))
@@ -275,31 +272,3 @@ def pixels(image: ImageView) -> Stored:
     if len(image.pixels) != wanted:
         raise ValueError(f"the image has {len(image.pixels) // kind.size} pixels instead of {wanted // kind.size}")
     return np.frombuffer(image.pixels, kind.dtype).reshape(image.rows, image.columns)
-
-
-def _field_length(message: memoryview, position: int, wire_type: int) -> tuple[int, int]:
-    """Length of a field's content, and the position where the content starts."""
-    match wire_type:
-        case 0:
-            return _varint(message, position)[1] - position, position
-        case 1:
-            return 8, position
-        case 2:
-            return _varint(message, position)
-        case 5:
-            return 4, position
-        case _:
-            raise ValueError(f"no foxglove.RawImage: unknown wire type {wire_type}")
-
-
-def _varint(message: memoryview, position: int) -> tuple[int, int]:
-    """Protobuf's variable-length integer at `position`, and the position after it."""
-    number = 0
-    for place in range(10):
-        if position + place >= len(message):
-            break
-        byte = message[position + place]
-        number |= (byte & 0x7F) << 7 * place
-        if byte < 0x80:
-            return number, position + place + 1
-    raise ValueError("no foxglove.RawImage: it ends in the middle of a number")

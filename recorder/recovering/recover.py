@@ -32,6 +32,7 @@ from rig.phrase import Phrase, phrase, plain
 from rig.tag import CameraTag, TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
+    COMPACT_METADATA,
     NOTES,
     RECOVERY_METADATA,
     RESULTS,
@@ -220,7 +221,9 @@ class _Recovery:
             Level.WARNING if words or end else Level.INFO, "recover", plain(f"recovered from {name} on {time}: {told}")
         )
         others = {
-            key: each for key, each in self._reader.metadata.items() if key not in (SESSION_METADATA, RIG_METADATA)
+            key: each
+            for key, each in self._reader.metadata.items()
+            if key not in (SESSION_METADATA, RIG_METADATA, COMPACT_METADATA)
         }
         recovery = {"source": name, "time": time, **lost, **end}
         return self._rebuilt.close({**others, RECOVERY_METADATA: recovery}, event)

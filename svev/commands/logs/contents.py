@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from recorder.checking.verify import Verdict, VerifyReport, verify
-from recorder.reading.info import LogInfo, imported_in_words, info, merged_in_words
+from recorder.reading.info import LogInfo, compacted_in_words, imported_in_words, info, merged_in_words
 from recorder.recovering.recover import RecoverReport, recover
 from rig.clocks import NS_PER_S
 from rig.errors import BadInputError, LedgerDiffersError, LogDamagedError, LogTruncatedError
@@ -194,6 +194,7 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
     told = (
         ("merged", merged_in_words(found.merged).removeprefix("merged ") if found.merged else ""),
         ("imported", imported_in_words(found.imported).removeprefix("imported ") if found.imported else ""),
+        ("compacted", compacted_in_words(found.compacted) if found.compacted else ""),
         ("trouble", found.trouble),
         ("ended early", found.ended_early),
         ("goes on from", f"{found.part_before}, which does not lie beside it" if found.part_before else ""),

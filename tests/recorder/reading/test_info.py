@@ -27,7 +27,7 @@ def test_a_log_says_what_it_is(tmp_path: Path) -> None:
             "K2": {"ok": 2, "lost": 1, "missed": 0, "damaged": 0, "absent": 1},
             "K3": {"ok": 3, "lost": 0, "missed": 0, "damaged": 0, "absent": 1},
         },
-        "utc": None, "source": None, "session": SESSION, "rig": RIG, "imported": {},
+        "utc": None, "source": None, "session": SESSION, "rig": RIG, "imported": {}, "compacted": {},
         "messages": {"/events": 2, "/triplet": 3, "/triplet/tag": 4, "/health": 1},
     }  # fmt: skip
 

@@ -124,7 +124,8 @@ def test_tags_fit_the_schema_in_the_log(tmp_path: Path) -> None:
             jsonschema.validate(json.loads(message.data), json.loads(schema.data))
 
 
-def _node(mode: str, path: Path) -> dict[str, Any]:
+def read_by_node(mode: str, path: Path) -> dict[str, Any]:
+    """What the TypeScript library reads of a log, indexed or as a stream."""
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed: the second independent reader cannot run")
@@ -148,7 +149,7 @@ def test_the_typescript_library_reads_every_bit(
 ) -> None:
     path = tmp_path / "log.mcap"
     written = write_log(path, PULSES, (64, 192), cameras)
-    found = _node(mode, path)
+    found = read_by_node(mode, path)
     assert found["profile"] == "svev"
     with path.open("rb") as file:
         expected = {

@@ -1,0 +1,1 @@
+"""Makes smaller logs for the archive."""

@@ -92,7 +92,7 @@ docs: setup $(DOCS) ## the documentation as a site in build/site, with search; a
 	@echo "open build/site/index.html"
 
 clean: ## remove everything that make made; keep recordings
-	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv .cache/tests build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	rm -rf tests/*/npm/node_modules
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.analysis.hill_logs import write_hill_log
 from recorder.reading.triplets import triplets
 from svev.cli import main
 from tests.analysis.simulated import training
+from tests.support.kept import kept_hill_log
 
 #: The jumper is in sight from hill pulse 23 to 60.
 PULSES = range(14, 70)
@@ -17,7 +17,7 @@ PULSES = range(14, 70)
 
 @pytest.mark.long
 def test_films_are_measured_and_a_wrong_start_is_named(tmp_path: Path) -> None:
-    jump = write_hill_log(tmp_path / "jump", training(), PULSES)
+    jump = kept_hill_log(training(), PULSES)
     assert main(["export", str(jump.path), "--out", str(tmp_path / "film.mkv"), "--separate"]) == 0
     films = [f"{name}={tmp_path}/film_{name}.mkv" for name in ("K1", "K2", "K3")]
     verdicts = []

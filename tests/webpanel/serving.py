@@ -31,6 +31,7 @@ class Panel:
     port: int
     service: MemoryService
     server: PanelServer
+    desks: Desks
 
     @property
     def url(self) -> str:
@@ -70,7 +71,7 @@ def serving(
     thread.start()
     try:
         wait_until(lambda: server.started or not thread.is_alive(), "the panel answers", 20)
-        yield Panel(access.host, port, service, server)
+        yield Panel(access.host, port, service, server, desks)
     finally:
         server.should_exit = True
         thread.join(20)

@@ -1,20 +1,22 @@
 """A jump on the simulated hill to measure by hand, with its truth, and an operator who clicks with scatter."""
 
+import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from analysis.cameras.source import read_source
+from analysis.cameras.source import Source, read_source
 from analysis.digitizing.desk import Desk
 from analysis.digitizing.files import DeskFiles
-from analysis.digitizing.programs.orienting import Orienting
+from analysis.digitizing.programs.orienting import _Known
 from analysis.measurements.model import POINTS
-from bench.analysis.hill_logs import HillLog, write_hill_log
+from bench.analysis.hill_logs import HillLog
 from rig.api.digitizing import PlaceAction, Tracking, TrackOrder
 from simrig.world.conditions.effects import MissingMarker
 from simrig.world.scenario import load_scenario
+from tests.support.kept import kept_hill_log, kept_object
 
 #: Scatter of a click, px.
 SCATTER_PX = 0.3
@@ -42,8 +44,8 @@ class Click:
         )  # fmt: skip
 
 
-def write_jump(folder: Path, *, markers: bool = True, seed: int | None = None) -> HillLog:
-    """The log, of a jumper with markers or without; of the hill's own seed if none is given."""
+def rendered_jump(*, markers: bool = True, seed: int | None = None) -> HillLog:
+    """The log, of a jumper with markers or without; of the hill's own seed if none is given. Not to be changed."""
     scenario = load_scenario(Path("config/scenarios/training.toml")).model_copy(update={"stamp": False})
     if not markers:
         bare = tuple(MissingMarker(marker=name) for name in POINTS)
@@ -51,7 +53,14 @@ def write_jump(folder: Path, *, markers: bool = True, seed: int | None = None) -
         scenario = scenario.model_copy(update={"jumper": jumper})
     if seed is not None:
         scenario = scenario.model_copy(update={"seed": seed})
-    return write_hill_log(folder / "jump", scenario, HILL_PULSES)
+    return kept_hill_log(scenario, HILL_PULSES)
+
+
+def placed(log: HillLog, folder: Path) -> HillLog:
+    """A log in a folder of its own, so that what is kept beside it is this test's."""
+    for file in (log.path, log.survey):
+        (folder / file.name).symlink_to(file)
+    return replace(log, path=folder / log.path.name, survey=folder / log.survey.name)
 
 
 def opened(log: HillLog, *, survey: bool = True) -> Desk:
@@ -63,10 +72,37 @@ def opened(log: HillLog, *, survey: bool = True) -> Desk:
     return desk
 
 
-def adopt(desk: Desk, orientation: Orienting) -> None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Oriented:
+    """The cameras of a log as they were oriented, and by what."""
+
+    known: _Known
+    given: Source | None
+
+    @classmethod
+    def of(cls, desk: Desk) -> "Oriented":
+        """Those of a desk."""
+        return cls(desk.programs.orienting._known, desk.programs.orienting._given)
+
+
+def orientation_of(log: HillLog) -> Oriented:
+    """The cameras of a kept log, oriented once by its survey."""
+
+    def orient() -> Oriented:
+        with tempfile.TemporaryDirectory() as folder:
+            desk = opened(placed(log, Path(folder)))
+            found = Oriented.of(desk)
+            desk.close()
+        return found
+
+    found: Oriented = kept_object("oriented", orient, log.path.parent.name)
+    return found
+
+
+def adopt(desk: Desk, orientation: Oriented) -> None:
     """Let a desk have cameras that were oriented before."""
-    desk.programs.orienting._errands.adopt("", orientation._known)
-    desk.programs.orienting._given = orientation._given
+    desk.programs.orienting._errands.adopt("", orientation.known)
+    desk.programs.orienting._given = orientation.given
 
 
 def followed(desk: Desk, operator: str, order: TrackOrder) -> Tracking:

@@ -18,7 +18,7 @@ from bench.analysis.hill_logs import HillLog
 from photogrammetry.geometry.camera_model import INTERIOR
 from rig.api.digitizing import PlaceAction, StateAction, TapeOrder, TrackOrder, UndoAction
 from rig.errors import BadInputError, StateForbidsError
-from tests.analysis.digitizing.hill import MEASURED, PATIENCE_S, adopt, clicks, opened
+from tests.analysis.digitizing.hill import MEASURED, PATIENCE_S, Oriented, adopt, clicks, opened
 from tests.support.waiting import wait_until
 
 
@@ -109,7 +109,7 @@ def test_a_view_is_the_same_whatever_was_computed_before(desk: Desk, jump: HillL
     assert undone is not None
     assert undone.model_copy(update={"revision": before.revision}) == before
     anew = opened(jump, survey=False)
-    adopt(anew, desk.programs.orienting)
+    adopt(anew, Oriented.of(desk))
     desk.close()
     assert anew.view("Anna", 20) == undone
     anew.close()

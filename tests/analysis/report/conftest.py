@@ -4,12 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.analysis.report.jumps import EVERY, write_jump_log
+from tests.analysis.report import jumps
+from tests.analysis.report.jumps import EVERY
 
 
 @pytest.fixture(scope="session")
-def jump_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def jump_log() -> Path:
     """The log of the first jump of the recordings, with an image of every fourth pulse."""
-    path = tmp_path_factory.mktemp("report") / "jump.mcap"
-    write_jump_log(path, EVERY)
-    return path
+    return jumps.jump_log(EVERY)

@@ -1,6 +1,6 @@
 """A log with rendered images of the jump that `tests.analysis.result.recordings` measures, and its measurements."""
 
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from simrig.images.view import CameraView
 from tests.analysis.result.recordings import model, recording
 from tests.analysis.simulated import RATE_HZ, SIZE, START_NS, simulated_measurements, training, true_cameras
 from tests.recorder.logs import RIG, RIG_TOML, SESSION, acquire, make_tag, open_writer
+from tests.support.kept import kept
 
 SHAPE = (SIZE[1], 3 * SIZE[0])
 EVERY = 4  #: pulses from image to image, to save time
@@ -28,13 +29,17 @@ def imaged_pulses(every: int = EVERY) -> list[int]:
     return list(range(pulses[0] - every, pulses[-1] + 2 * every, every))
 
 
-def write_jump_log(path: Path, every: int = EVERY, lost: str = "") -> None:
-    """The log of a jump; `lost`: a camera that never delivers a frame."""
+def jump_log(every: int = EVERY, lost: str = "") -> Path:
+    """The log of a jump, not to be changed; `lost`: a camera that never delivers a frame."""
+    return kept("jump-log", partial(_write, every=every, lost=lost), every, lost) / "log.mcap"
+
+
+def _write(folder: Path, every: int, lost: str) -> None:
     scenario = training().model_copy(update={"seed": JUMP_SEED})
     views = [CameraView(scenario, camera, *SIZE, RATE_HZ) for camera in range(3)]
     statuses = [FrameStatus.LOST if camera.name == lost else FrameStatus.OK for camera in scenario.cameras]
     buffers = TripletBuffers(SHAPE, 4)
-    with open_writer(path, buffers, LogDescription(SESSION, RIG, RIG_TOML)) as log:
+    with open_writer(folder / "log.mcap", buffers, LogDescription(SESSION, RIG, RIG_TOML)) as log:
         for pulse in imaged_pulses(every):
             slot = acquire(buffers)
             image = buffers.pixels(slot)

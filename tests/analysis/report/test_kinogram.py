@@ -26,7 +26,7 @@ from analysis.scene.camera_system import PlacedCamera
 from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.phrase import phrase
-from tests.analysis.report.jumps import JUMP_SEED, measured_recording, measurements, write_jump_log
+from tests.analysis.report.jumps import JUMP_SEED, jump_log, measured_recording, measurements
 from tests.analysis.result.recordings import model, without_takeoff
 from tests.analysis.simulated import RATE_HZ, true_cameras
 
@@ -35,11 +35,9 @@ NASTY = {"athlete": "Bjørn </main><b>Ås</b>", "bib": '1"7', "gate": "12"}
 
 
 @pytest.fixture(scope="module")
-def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def log() -> Path:
     """The log of the jump, with an image of every pulse."""
-    path = tmp_path_factory.mktemp("kinogram") / "jump.mcap"
-    write_jump_log(path, 1)
-    return path
+    return jump_log(1)
 
 
 @pytest.fixture(scope="module")
@@ -186,11 +184,10 @@ def test_a_place_without_a_frame_has_no_picture_of_another_pulse(jump_log: Path,
     assert "no picture of him here ikke noe bilde her" in _text((tmp_path / "kinogram.html").read_text("utf-8"))
 
 
-def test_another_camera_is_taken_where_the_best_one_delivered_nothing(shots: list[Shot], tmp_path: Path) -> None:
+def test_another_camera_is_taken_where_the_best_one_delivered_nothing(shots: list[Shot]) -> None:
     best = shots[2].camera
     assert best is not None
-    write_jump_log(tmp_path / "log.mcap", 1, lost=best)
-    others = _shots(measured_recording().jumps[0], tmp_path / "log.mcap")
+    others = _shots(measured_recording().jumps[0], jump_log(1, lost=best))
     assert best not in {shot.camera for shot in others}
     assert others[2].moment is not None
     assert shots[2].moment is not None

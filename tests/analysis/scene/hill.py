@@ -18,6 +18,7 @@ from rig.arrays import Floats
 from rig.pulse import HillPulse
 from simrig.images.view import CameraView
 from simrig.world.scenario import Scenario, load_scenario
+from tests.support.kept import kept_object
 
 SIZE = (640, 480)
 RATE_HZ = 30.0
@@ -47,13 +48,19 @@ def hill_images(scenario: Scenario, size: tuple[int, int] = SIZE, frames: int = 
 @cache
 def training_images() -> dict[str, StaticImage]:
     """Those of the training scenario; not to be changed."""
-    return hill_images(training())
+    found: dict[str, StaticImage] = kept_object("training-images", lambda: hill_images(training()))
+    return found
 
 
 @cache
 def training_detections() -> dict[str, Detections]:
     """What is found in them."""
-    return {name: detect_balls(image) for name, image in training_images().items()}
+
+    def detect() -> dict[str, Detections]:
+        return {name: detect_balls(image) for name, image in training_images().items()}
+
+    found: dict[str, Detections] = kept_object("training-detections", detect)
+    return found
 
 
 def oriented(data: dict[str, Any]) -> Scene:

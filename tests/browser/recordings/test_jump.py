@@ -14,7 +14,7 @@ from analysis.report.overlay_file import write_overlay
 from analysis.result import file as result_file
 from analysis.worker.findings import summary
 from service.measuring.keeping import keep_result
-from tests.analysis.report.jumps import measured_recording, write_jump_log
+from tests.analysis.report.jumps import jump_log, measured_recording
 from tests.analysis.simulated import RATE_HZ, SIZE, true_cameras
 from tests.browser.conftest import Open
 from tests.browser.views import AXE, assert_fits_a_phone
@@ -40,7 +40,7 @@ ROWS = """() => [...document.querySelectorAll("#player :is(button, select, input
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log with rendered images of a jump; its result lies beside it."""
     log = tmp_path_factory.mktemp("log") / "jump.mcap"
-    write_jump_log(log, 1)
+    log.symlink_to(jump_log(1))
     made, result = log.parent / "made", measured_recording()
     made.mkdir()
     result_file.write(result, made / "jumper.json")

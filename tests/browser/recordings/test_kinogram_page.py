@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from analysis.report.kinogram.earlier import read_earlier
 from analysis.report.kinogram.folder import write_kinograms
 from analysis.result.model import Quantity
-from tests.analysis.report.jumps import measured_recording, measurements, write_jump_log
+from tests.analysis.report.jumps import jump_log, measured_recording, measurements
 from tests.analysis.simulated import true_cameras
 from tests.browser.conftest import Open
 from tests.browser.views import AXE
@@ -22,8 +22,8 @@ _EVERY = 7  # the edge has a picture then, and the other places have none
 def kinogram(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Address of a page with pictures, places without one, and marks."""
     folder = tmp_path_factory.mktemp("kinogram")
-    write_jump_log(folder / "log.mcap", _EVERY)
-    given = measured_recording(), measurements(), true_cameras(), folder / "log.mcap", folder
+    log = jump_log(_EVERY)
+    given = measured_recording(), measurements(), true_cameras(), log, folder
     write_kinograms(*given)
     (own,) = read_earlier(folder)
     earlier = [

@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from analysis.report.coach import report_page
 from analysis.result.model import Quantity
-from tests.analysis.report.jumps import measured_recording, measurements, write_jump_log
+from tests.analysis.report.jumps import jump_log, measured_recording, measurements
 from tests.analysis.simulated import true_cameras
 from tests.browser.conftest import Open
 from tests.browser.views import AXE
@@ -19,10 +19,8 @@ _EVERY = 12  # few pulses have pictures, to save time
 def report(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Address of a page."""
     folder = tmp_path_factory.mktemp("page")
-    write_jump_log(folder / "log.mcap", _EVERY)
-    page = report_page(
-        measured_recording(), measurements(), true_cameras(), folder / "log.mcap", {1: Quantity(2.052, 0.006)}
-    )
+    log = jump_log(_EVERY)
+    page = report_page(measured_recording(), measurements(), true_cameras(), log, {1: Quantity(2.052, 0.006)})
     (folder / "report.html").write_text(page, encoding="utf-8")
     return (folder / "report.html").as_uri()
 

@@ -14,7 +14,7 @@ import pytest
 from pydantic import ValidationError
 
 from analysis.report.kinogram.earlier import read_earlier
-from bench.analysis.hill_logs import HillLog, write_hill_log
+from bench.analysis.hill_logs import HillLog
 from recorder.catalogue.folder import Catalogue
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import write_session_changes
@@ -29,6 +29,7 @@ from service.recordings import live_results
 from service.recordings.measured_jumps import MeasuredJumps
 from tests.analysis.simulated import training
 from tests.recorder.logs import write_log
+from tests.support.kept import kept_hill_log
 from tests.support.rigs import SIM
 from tests.support.waiting import wait_until
 
@@ -38,9 +39,9 @@ OVER = (MeasuringState.DONE, MeasuringState.FAILED)
 
 
 @pytest.fixture(scope="module")
-def hill(tmp_path_factory: pytest.TempPathFactory) -> HillLog:
-    """One jump; the jumper is in sight from hill pulse 23 to 60."""
-    return write_hill_log(tmp_path_factory.mktemp("hill") / "jump", training(), range(16, 66))
+def hill() -> HillLog:
+    """One jump; the jumper is in sight from hill pulse 23 to 60. Not to be changed."""
+    return kept_hill_log(training(), range(16, 66))
 
 
 class Bench:

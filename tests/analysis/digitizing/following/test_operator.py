@@ -11,7 +11,7 @@ from analysis.digitizing.desk import Desk
 from bench.analysis.hill_logs import HillLog
 from rig.api.digitizing import Action, MarkState, PlaceAction, StateAction, TrackOrder
 from rig.arrays import Floats
-from tests.analysis.digitizing.hill import clicks, followed, opened, write_jump
+from tests.analysis.digitizing.hill import clicks, followed, opened, placed, rendered_jump
 
 START, PULSES = 20, range(13, 33)
 #: Before these he is on the table, where skis cover each other: what is followed there holds, but not all of it is.
@@ -21,7 +21,7 @@ THINGS = ["P1", "P2", "P3", "P4", "right ski", "left ski"]
 
 @pytest.mark.long
 def test_twenty_pulses_in_the_air_take_less_than_sixty_clicks(tmp_path: Path) -> None:
-    log: HillLog = write_jump(tmp_path, markers=False, seed=111)
+    log = placed(rendered_jump(markers=False, seed=111), tmp_path)
     desk = opened(log)
     made: list[Action] = [click.action() for click in clicks(desk, log, 111, range(START, START + 1), markers=False)]
     made += _states([action for action in made if isinstance(action, PlaceAction)])

@@ -9,14 +9,14 @@ from analysis.digitizing.desk import Desk
 from analysis.digitizing.files import DeskFiles
 from bench.analysis.hill_logs import HillLog
 from rig.api.digitizing import HandResult
-from tests.analysis.digitizing.hill import adopt, clicks
+from tests.analysis.digitizing.hill import Oriented, adopt, clicks
 from tests.support.waiting import wait_until
 
 
 def test_computing_stands_still_while_a_recording_runs_and_can_be_cancelled(jump: HillLog, desk: Desk) -> None:
     files = DeskFiles(jump.path, jump.path.with_suffix(".digitized"), jump.path.with_suffix(".measured"))
     waiting = Desk(files, lambda: None, busy=lambda: True)
-    adopt(waiting, desk.programs.orienting)
+    adopt(waiting, Oriented.of(desk))
     for click in clicks(desk, jump, 3, range(18, 21)):
         waiting.act("Anna", click.action())
     assert waiting.programs.compute("Anna").state == "computing"

@@ -6,7 +6,7 @@ from analysis.digitizing.desk import Desk
 from bench.analysis.hill_logs import HillLog
 from rig.api.digitizing import TrackOrder
 from rig.errors import UnknownRecordingError
-from tests.analysis.digitizing.hill import PATIENCE_S, adopt, clicks
+from tests.analysis.digitizing.hill import PATIENCE_S, Oriented, adopt, clicks
 from tests.support.waiting import wait_until
 
 ORDER = TrackOrder(things=["P1", "P2"], pulse=20, direction=1, most=10)
@@ -16,7 +16,7 @@ ORDER = TrackOrder(things=["P1", "P2"], pulse=20, direction=1, most=10)
 def test_following_stands_still_while_a_recording_runs_and_cancelled_keeps_nothing(jump: HillLog, desk: Desk) -> None:
     recording = True
     waiting = Desk(desk.files, lambda: None, busy=lambda: recording)
-    adopt(waiting, desk.programs.orienting)
+    adopt(waiting, Oriented.of(desk))
     for click in clicks(desk, jump, 3, range(20, 21)):
         waiting.act("Anna", click.action())
     before = waiting.session("Anna").everything()

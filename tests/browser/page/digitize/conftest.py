@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from bench.analysis.hill_logs import HillLog, write_hill_log
+from bench.analysis.hill_logs import HillLog
 from rig.arrays import Floats
+from tests.analysis.digitizing.hill import adopt, orientation_of
 from tests.analysis.simulated import SIZE, training
 from tests.browser.conftest import Open
+from tests.support.kept import kept_hill_log
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
@@ -78,15 +80,24 @@ class Desk:
         assert answer.status_code == 200, answer.text
 
 
-@pytest.fixture(scope="module")
-def rendered(tmp_path_factory: pytest.TempPathFactory) -> HillLog:
+@pytest.fixture(scope="session")
+def rendered() -> HillLog:
     """Twenty pulses of the rendered hill, to be copied."""
-    return write_hill_log(tmp_path_factory.mktemp("hill") / "jump", training(), range(36, 56))
+    return kept_hill_log(training(), range(36, 56))
 
 
 @pytest.fixture
-def desk(rendered: HillLog, service: MemoryService, panel: Panel) -> Iterator[Desk]:
-    """The rendered jump in the panel."""
+def desk(desk_by_survey: Desk, service: MemoryService, panel: Panel) -> Desk:
+    """The same, with cameras that were oriented by that survey before."""
+    survey, service.survey = service.survey, None
+    adopt(panel.desks.desk("jump"), orientation_of(desk_by_survey.log))
+    service.survey = survey
+    return desk_by_survey
+
+
+@pytest.fixture
+def desk_by_survey(rendered: HillLog, service: MemoryService, panel: Panel) -> Iterator[Desk]:
+    """The rendered jump in the panel; when it is opened first, its cameras are oriented by the survey."""
     shutil.copy(rendered.path, service.catalogue.directory / "jump.mcap")
     service.survey = rendered.survey
     with httpx.Client(base_url=f"{panel.url}/api/recordings/jump/digitizing", timeout=20) as client:

@@ -39,7 +39,8 @@ def test_what_the_service_says_is_in_the_language_of_the_page(desk: Desk, open_p
     expect(page.locator("#orientation-message")).to_contain_text("et bilde trenger 4 klikkede baller eller flere")
 
 
-def test_balls_that_were_clicked_orient_the_cameras(desk: Desk, open_page: Open) -> None:
+def test_balls_that_were_clicked_orient_the_cameras(desk_by_survey: Desk, open_page: Open) -> None:
+    desk = desk_by_survey
     scenario = training()
     for camera in CAMERAS:
         projection = scenario.cameras[scenario.camera_index(camera)].projection(*SIZE)

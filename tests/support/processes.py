@@ -40,6 +40,9 @@ class Process:
         return f"process {self.pid} still runs: {self.command}"
 
 
+#: Processes that were there before us, and so are not ours: most on a computer. They are not looked at again, since a
+#: look takes the kernel some 50 us. A number is given to another process only when all others have had their turn.
+_older: set[int] = set()
 #: Processes that serve many tests, and so do not belong to the one that used them first.
 _shared: set[int] = set()
 
@@ -68,13 +71,15 @@ def all_processes(token: str) -> frozenset[Process]:
     here = os.getpid()
     us = _read(here)
     assert us is not None
-    pids = (int(name) for name in os.listdir("/proc") if name.isdecimal())  # noqa: PTH208 - numbers, looked at often
-    # Older processes were there before us, and so are not ours; they need not be looked at closer.
-    everyone = {pid: process for pid in pids if (process := _read(pid, since=us.started))}
+    pids = {int(name) for name in os.listdir("/proc") if name.isdecimal()}  # noqa: PTH208 - numbers, looked at often
+    _older.intersection_update(pids)
+    everyone = {pid: process for pid in pids - _older if (process := _read(pid))}
+    _older.update(pid for pid, process in everyone.items() if process.started < us.started)
     return frozenset(
         process
         for process in everyone.values()
         if process.pid != here
+        and process.pid not in _older
         and _RESOURCE_TRACKER not in process.command
         and (_descends(process, {here}, everyone) or _carries(process.pid, token))
     )
@@ -97,14 +102,12 @@ def peak_memory_bytes() -> int:
     return int(line.split()[1]) * 1024
 
 
-def _read(pid: int, since: int = 0) -> Process | None:
-    """The process of this number; None if it has just gone, or was started before `since` (clock ticks)."""
+def _read(pid: int) -> Process | None:
+    """The process of this number; None if it has just gone."""
     try:
         stat = _stat(pid)
         # The name stands in parentheses and may hold anything, a closing parenthesis included.
         name, fields = stat[stat.index("(") + 1 : stat.rindex(")")], stat[stat.rindex(")") + 2 :].split()
-        if int(fields[19]) < since:
-            return None
         command = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
     except OSError:
         return None

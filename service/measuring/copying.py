@@ -1,19 +1,23 @@
-"""The program that copies a log and all that belongs to it elsewhere, started by `service.measuring.after_steps`."""
+"""The program that copies a log and all that belongs to it elsewhere, started by `service.measuring.after_steps`.
 
-import os
+A log counts as copied when it was read back from the other disk and its checksum stands beside it, in the form that
+`sha256sum --check` reads.
+"""
+
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
 from rig.api.measuring import MeasuringStep
 from rig.background.program import Teller, serve
 from rig.errors import StorageError
-from rig.host.disk import ask_free_bytes, sync
-from rig.host.files import open_to_read
+from rig.host.disk import ask_free_bytes, replace_file, sync
 from rig.phrase import phrase
+from service.measuring.verified_copy import checksum, copy_file
 
-_PIECE: Final = 1 << 22
+_LOG: Final = ".mcap"
+_SUM: Final = ".sha256"
 
 
 def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
@@ -29,68 +33,96 @@ def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
         )
     sources = [Path(each) for each in asked["paths"]]
     wanted = [source for source in sources if source.exists() and not _is_copied(source, to / source.name)]
-    sizes = [sum(path.stat().st_size for path in _files(source)) for source in wanted]
-    if ask_free_bytes(to) < sum(sizes):
+    sizes = sum(path.stat().st_size for source in wanted for path in _files(source))
+    there = sum(part.stat().st_size for source in wanted if (part := _part(source, to)).is_file())
+    if ask_free_bytes(to) < sizes - there:
         raise StorageError(
             phrase(
                 "copying_no_room",
                 "{folder}: has not the {gb:.1f} GB free that the copy takes; make room, then measure again",
                 folder=str(to),
-                gb=sum(sizes) / 1000000000.0,
+                gb=(sizes - there) / 1e9,
             )
         )
-    done, everything = 0, max(1, sum(sizes))
+    done = 0
+
+    def told(count: int) -> None:
+        nonlocal done
+        done += count
+        tell(step=MeasuringStep.COPYING, share=done / (2 * sizes))
+
     for source in wanted:
-        part = to / f".{source.name}.part"
-        if part.is_dir():
-            shutil.rmtree(part)
-        for path in _files(source):
-            target = part / path.relative_to(source) if source.is_dir() else part
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with open_to_read(path, links=False) as reader, target.open("wb") as writer:
-                for count in _pieces(reader, writer):
-                    done += count
-                    tell(step=MeasuringStep.COPYING, share=done / everything)
-            shutil.copystat(path, target)
-        if part.exists():
-            _rename(part, to / source.name)
+        if source.suffix == _LOG and (to / source.name).exists():
+            _confirm(source, to / source.name, told)
+        else:
+            _copy_one(source, to, told)
     sync(to)
     return {}
 
 
+def _copy_one(source: Path, to: Path, told: Callable[[int], None]) -> None:
+    """Copy a file or a folder; a folder is begun anew, since it is small and may have changed."""
+    part, target = _part(source, to), to / source.name
+    if part.is_dir():
+        shutil.rmtree(part)
+    digest = ""
+    for path in _files(source):
+        copy = part / path.relative_to(source) if source.is_dir() else part
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        digest = copy_file(path, copy, told)
+        shutil.copystat(path, copy)
+    if part.exists():
+        _rename(part, target)
+    if source.suffix == _LOG:
+        _keep_sum(target, digest)
+
+
+def _confirm(source: Path, target: Path, told: Callable[[int], None]) -> None:
+    """Compare a log with a copy that has no checksum beside it: of an earlier version, or of somebody else.
+
+    Raises:
+        StorageError: it is another log of this name.
+    """
+    digest = checksum(source, told)
+    if checksum(target, told) != digest:
+        raise _another(target)
+    _keep_sum(target, digest)
+
+
+def _keep_sum(target: Path, digest: str) -> None:
+    replace_file(_sum_of(target), f"{digest}  {target.name}\n".encode(), links=False)
+
+
 def _is_copied(source: Path, target: Path) -> bool:
-    """Whether a log is there with the same size; results and notes are always copied anew.
+    """Whether a log is there, read back; results and notes are always copied anew.
 
     Raises:
         StorageError: another log of this name is there.
     """
-    if source.suffix != ".mcap" or not target.exists():
+    if source.suffix != _LOG or not target.exists():
         return False
-    ours, there = source.stat(), target.stat()
-    if ours.st_size != there.st_size:
-        raise StorageError(
-            phrase(
-                "copying_other_log",
-                "{path}: is another log of this name; move it away, then measure again",
-                path=str(target),
-            )
-        )
-    return True
+    if source.stat().st_size != target.stat().st_size:
+        raise _another(target)
+    return _sum_of(target).exists()
+
+
+def _another(target: Path) -> StorageError:
+    text = "{path}: is another log of this name; move it away, then measure again"
+    return StorageError(phrase("copying_other_log", text, path=str(target)))
+
+
+def _part(source: Path, to: Path) -> Path:
+    return to / f".{source.name}.part"
+
+
+def _sum_of(target: Path) -> Path:
+    return target.with_name(target.name + _SUM)
 
 
 def _files(source: Path) -> list[Path]:
     if not source.is_dir():
         return [source]
     return [path for path in sorted(source.rglob("*")) if path.is_file() and not path.is_symlink()]
-
-
-def _pieces(reader: BinaryIO, writer: BinaryIO) -> Iterator[int]:
-    """Copy until the end; yields the bytes of each piece."""
-    while piece := reader.read(_PIECE):
-        writer.write(piece)
-        yield len(piece)
-    writer.flush()
-    os.fsync(writer.fileno())
 
 
 def _rename(part: Path, target: Path) -> None:

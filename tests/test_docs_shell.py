@@ -17,12 +17,12 @@ from typing import Final
 
 import pytest
 
-from bench.analysis.hill_logs import write_hill_log
 from rig.settings.file import CONFIG
 from simrig.programs.simulated_hill import SimulatedHill
-from simrig.world.scenario import load_scenario
+from tests.analysis.measured import measured_jump
 from tests.reader_files import PREPARED
 from tests.service.serving import Serving, serving
+from tests.support.kept import kept
 from tests.support.loopback import Loopback
 from tests.support.rigs import write_rig
 from tests.support.waiting import wait_until
@@ -49,7 +49,6 @@ BESIDE: Final = {r"dask scheduler": "Scheduler at:", r"dask worker": "Registered
 ASKS: Final = {r"svev setup": "English or Norwegian"}
 #: Commands that record at 30 Hz: on a busy computer frames are missing, and exit code 3 says so.
 _KEEPS_TIME: Final = re.compile(r"svev (doctor|demo|rehearse|record|verify \S+\*|analyze \S+\*)")
-_PULSES: Final = range(22, 72)  # of the simulated hill: one whole jump
 
 
 def _commands(page: Path) -> list[str]:
@@ -101,20 +100,23 @@ def test_blocks_with_commands_are_shell_blocks() -> None:
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with `recordings/jump.mcap`, its survey, poses, pictures, and `results/jump`."""
-    folder = tmp_path_factory.mktemp("recorded")
+def recorded() -> Path:
+    """A folder with `recordings/jump.mcap`, its survey, poses, pictures, and `results/jump`; not to be changed."""
+    return kept("docs-shell", _record)
+
+
+def _record(folder: Path) -> None:
     (folder / "recordings").mkdir()
-    log = write_hill_log(folder / "recordings" / "jump", load_scenario(CONFIG / "scenarios" / "training.toml"), _PULSES)
-    shutil.copy(log.survey, folder / "survey.json")
+    jump = measured_jump()
+    shutil.copy(jump.log.path, folder / "recordings" / "jump.mcap")
+    shutil.copy(jump.log.survey, folder / "survey.json")
+    shutil.copytree(jump.result, folder / "results" / "jump")
     for command in (
-        "svev analyze recordings/jump.mcap --survey survey.json -o results/jump",
         "svev orient results/jump/network.json -o poses.json",
         "svev export recordings/jump.mcap --out pictures --images tiff",
     ):
         done = _run(folder, command)
         assert done.returncode == 0, done.stderr
-    return folder
 
 
 def _environment(folder: Path) -> dict[str, str]:
@@ -173,9 +175,11 @@ def _going_on(folder: Path, command: str, ready: str, **environment: str) -> Ite
 def place(recorded: Path, tmp_path: Path, loopback: Loopback) -> Path:
     """What a reader has in his folder."""
     log = "recordings/jump.mcap"
-    for name in (log, "season/2026-11-21T19-40-18Z.mcap", "jump.mcap"):
+    (tmp_path / log).parent.mkdir()
+    shutil.copy(recorded / log, tmp_path / log)
+    for name in ("season/2026-11-21T19-40-18Z.mcap", "jump.mcap"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        os.link(recorded / log, tmp_path / name)
+        os.link(tmp_path / log, tmp_path / name)
     for camera, view in (("K1", "left"), ("K2", "middle"), ("K3", "right")):
         shutil.copytree(recorded / "pictures" / camera, tmp_path / view)
     shutil.copy(recorded / "survey.json", tmp_path)

@@ -14,19 +14,19 @@ import zmq
 
 from analysis.measurements.file import read_measurements
 from analysis.procedure.analyze import analyze
-from bench.analysis.hill_logs import HillLog, write_hill_log
+from bench.analysis.hill_logs import HillLog
+from tests.analysis.measured import FIRST_DAY, PULSES, measured_jump
 from tests.analysis.simulated import training
 from tests.support.commands import run_svev
+from tests.support.kept import kept_hill_log
 from tests.support.loopback import Loopback
 
-#: The jumper is in sight from hill pulse 23 to 60.
-PULSES = range(14, 70)
 AT_MOST = 6.0  # sigmas, of live states: where the motion has just changed, large errors are not so rare
 
 
 @pytest.fixture(scope="module")
-def jump(tmp_path_factory: pytest.TempPathFactory) -> HillLog:
-    return write_hill_log(tmp_path_factory.mktemp("hill") / "jump", training(), PULSES)
+def jump() -> HillLog:
+    return kept_hill_log(training(), PULSES, FIRST_DAY)
 
 
 def svev(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[str]:
@@ -39,8 +39,7 @@ def svev(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[s
 def test_a_jump_is_measured_and_its_errors_are_within_their_sigmas(
     jump: HillLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = tmp_path / "result"
-    summary = json.loads(svev("analyze", jump.path, "--survey", jump.survey, "--out", out, "--json").stdout)
+    out, summary = measured_jump().result, measured_jump().summary
     result = json.loads((out / "jumper.json").read_text())
     assert result["format"] == "svev-jumper/1"
     assert len(result["jumps"]) == 1
@@ -131,7 +130,7 @@ def _the_example_of_the_documentation_runs(
 
 
 def test_what_cannot_be_measured_is_said_in_one_line(jump: HillLog, tmp_path: Path) -> None:
-    empty = write_hill_log(tmp_path / "empty", training(), range(75, 100))
+    empty = kept_hill_log(training(), range(75, 100), "empty")
     out = tmp_path / "out"
     nobody = svev("analyze", empty.path, "--survey", empty.survey, "--out", out, code=3)
     assert "nobody jumps in it" in nobody.stderr

@@ -10,10 +10,9 @@ from typing import Any
 
 import pytest
 
-from bench.analysis.hill_logs import write_hill_log
 from season.running.outcome import LogState, decoded
 from season.running.stores import OUTCOME
-from tests.analysis.simulated import training
+from tests.analysis.measured import FIRST_DAY, measured_jump
 from tests.season.files import campaign_file
 from tests.season.test_run import contents
 from tests.support.loopback import Loopback
@@ -62,10 +61,10 @@ def season_run(campaign: Path) -> dict[str, Any]:
 @pytest.mark.long
 @pytest.mark.timeout(500)
 def test_logs_of_an_object_store_are_measured_there(tmp_path: Path, server: str) -> None:
-    log = write_hill_log(tmp_path / "2026-11-21T10-00-00Z", training(), range(18, 66)).path
+    alone = measured_jump()
     damaged = tmp_path / "2026-11-22T10-00-00Z.mcap"
     damaged.write_bytes(b"no log")
-    store(server, "put", str(log), str(damaged))
+    store(server, "put", str(alone.log.path), str(damaged))
     campaign = campaign_file(tmp_path, logs=["s3://hill/day"], more=f'[store]\nendpoint_url = "{server}"')
     found = season_run(campaign)
     assert (found["done"], found["failed"], found["jumps"]) == (1, 1, 1), found["problems"]
@@ -74,13 +73,10 @@ def test_logs_of_an_object_store_are_measured_there(tmp_path: Path, server: str)
     assert again["problems"] == found["problems"]
     there = tmp_path / "there"
     store(server, "get", str(there))
-    outcome = decoded((there / "2026-11-21T10-00-00Z.season" / OUTCOME).read_bytes())
+    outcome = decoded((there / f"{FIRST_DAY}.season" / OUTCOME).read_bytes())
     assert outcome is not None
     assert outcome.state is LogState.DONE
-    alone = tmp_path / "alone"
-    command = ["analyze", str(log), "--survey", str(tmp_path / "survey.json"), "--out", str(alone)]
-    subprocess.run([sys.executable, "-m", "svev", *command], capture_output=True, timeout=300, check=True)
-    ours, theirs = contents(there / "2026-11-21T10-00-00Z.season"), contents(alone)
+    ours, theirs = contents(there / f"{FIRST_DAY}.season"), contents(alone.result)
     assert ours.keys() == theirs.keys()
     assert [name for name in ours if ours[name] != theirs[name]] == []
-    assert "s3://hill/day/2026-11-21T10-00-00Z.season/report.html" in (tmp_path / "season" / "season.html").read_text()
+    assert f"s3://hill/day/{FIRST_DAY}.season/report.html" in (tmp_path / "season" / "season.html").read_text()

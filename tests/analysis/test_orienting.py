@@ -1,6 +1,7 @@
 """Cameras that are knocked during a recording are oriented from the time in which they stood still."""
 
 import numpy as np
+import pytest
 
 from analysis.procedure.orienting import oriented
 from rig.pulse import HillPulse
@@ -9,6 +10,7 @@ from tests.analysis.cameras.moving_hill import Film, moving
 from tests.analysis.scene.hill import RATE_HZ, SIZE, survey_json, survey_of, training
 
 
+@pytest.mark.long
 def test_the_balls_of_a_knocked_camera_are_measured_where_they_were_for_the_longest_time() -> None:
     film = Film(moving("K2", moves=[{"from_s": 1.4, "rotation_deg": (0.03, 0.04, 0.0)}]), 60)
     survey = survey_of(survey_json(training(), 1))

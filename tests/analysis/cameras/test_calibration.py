@@ -48,6 +48,7 @@ def read(tmp_path: Path) -> Callable[[dict[str, Any]], OrientedScene]:
 Read = Callable[[dict[str, Any]], OrientedScene]
 
 
+@pytest.mark.long
 def test_the_network_beside_the_result_gives_the_same_poses(tmp_path: Path) -> None:
     scene = _surveyed()
     write_network(scene.network, tmp_path / "network.json")

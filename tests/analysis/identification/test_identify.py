@@ -169,6 +169,7 @@ def test_what_is_no_disc_like_the_markers_is_none_and_a_marker_in_the_shade_is_o
         made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), PULSES, dim)
 
 
+@pytest.mark.long
 def test_a_second_look_adds_what_was_missed() -> None:
     made = scene([true_jump(7)], true_cameras(), np.random.default_rng(7), PULSES, Disturbed(5, lost=0.3))
 

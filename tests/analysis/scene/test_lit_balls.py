@@ -12,6 +12,7 @@ from rig.arrays import Floats
 from simrig.world.conditions.effects import Light, Sun
 from simrig.world.scenario import Scenario
 from tests.analysis.scene.hill import balls_in, hill_images, normalized_error, survey_json, survey_of, training
+from tests.support.repeats import repeats
 
 SIDE = Sun(azimuth_deg=-90, elevation_deg=20, roughness_deg=25, gloss=0.2)
 
@@ -74,7 +75,7 @@ def _off(scene: Scene, scenario: Scenario) -> tuple[Floats, Floats]:
     return np.array([off for off, _ in rows]), np.array([sigma for _, sigma in rows])
 
 
-@pytest.mark.parametrize("radius", [0.095, None], ids=["radius known", "radius unknown"])
+@pytest.mark.parametrize("radius", repeats([0.095, None]), ids=["radius known", "radius unknown"])
 def test_with_the_sun_from_the_side_balls_are_measured_at_their_centre(radius: float | None) -> None:
     """The discs are 0.6 to 0.9 px off, all alike; a radius that is 5 % wrong leaves 0.1 px."""
     scenario = _lit(SIDE)

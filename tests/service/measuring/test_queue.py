@@ -109,6 +109,8 @@ def bench(tmp_path: Path, hill: HillLog) -> Bench:
     return Bench(tmp_path, hill.survey)
 
 
+@pytest.mark.long
+@pytest.mark.alone
 def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside_it(bench: Bench) -> None:
     bench.busy = True
     with bench.running() as queue:

@@ -202,6 +202,7 @@ def test_a_click_is_refined_and_followed_through_the_images(desk: Desk, open_pag
     assert set(desk.session()["coverage"]["P1"]["K1"]) == {str(PULSE)}, "one step takes the whole run back"
 
 
+@pytest.mark.long
 def test_a_ski_is_found_more_exactly_in_all_images_at_once(desk: Desk, open_page: Open) -> None:
     page = enter(open_page, desk, width=1700, height=900)
     placed = 0

@@ -39,6 +39,7 @@ def test_what_the_service_says_is_in_the_language_of_the_page(desk: Desk, open_p
     expect(page.locator("#orientation-message")).to_contain_text("et bilde trenger 4 klikkede baller eller flere")
 
 
+@pytest.mark.long
 def test_balls_that_were_clicked_orient_the_cameras(desk_by_survey: Desk, open_page: Open) -> None:
     desk = desk_by_survey
     scenario = training()

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,10 +12,9 @@ from typing import Any
 
 import pytest
 
-from bench.analysis.hill_logs import write_hill_log
 from season.running.outcome import LogState, decoded
 from season.running.stores import OUTCOME
-from tests.analysis.simulated import training
+from tests.analysis.measured import measured_jump
 from tests.season.files import campaign_file, log_file
 from tests.support.waiting import wait_until
 
@@ -54,6 +54,7 @@ def begun(folder: Path) -> list[Path]:
     return [path for path in folder.glob(".*.season.*") if path.is_dir()]
 
 
+@pytest.mark.long
 def test_a_log_that_cannot_be_measured_is_named_and_passed_over(tmp_path: Path) -> None:
     """It is not tried again before it changes."""
     damaged = log_file(tmp_path / "hill" / "damaged.mcap", b"no log at all")
@@ -81,10 +82,8 @@ def test_a_log_that_cannot_be_measured_is_named_and_passed_over(tmp_path: Path) 
 def test_what_is_killed_is_resumed_and_equals_what_svev_analyze_writes(tmp_path: Path) -> None:
     hill = tmp_path / "hill"
     hill.mkdir()
-    logs = [
-        write_hill_log(hill / f"2026-11-2{day}T10-00-00Z", training(), range(first, 66)).path
-        for day, first in ((1, 16), (2, 18))
-    ]
+    alone = [measured_jump(), measured_jump("2026-11-22T10-00-00Z", range(18, 66))]
+    logs = [Path(shutil.copy(jump.log.path, hill)) for jump in alone]
     campaign = campaign_file(tmp_path)
     with started(campaign) as process:
         wait_until(lambda: len(begun(hill)) == 2, timeout_s=120, what="two logs are being measured")
@@ -96,10 +95,7 @@ def test_what_is_killed_is_resumed_and_equals_what_svev_analyze_writes(tmp_path:
     before = [path.stat().st_mtime_ns for log in logs for path in sorted(log.with_suffix(".season").iterdir())]
     assert season_run(campaign)["done"] == 2
     assert before == [path.stat().st_mtime_ns for log in logs for path in sorted(log.with_suffix(".season").iterdir())]
-    for log in logs:
-        alone = tmp_path / f"{log.stem}.alone"
-        command = ["analyze", str(log), "--survey", str(tmp_path / "survey.json"), "--out", str(alone)]
-        subprocess.run([sys.executable, "-m", "svev", *command], capture_output=True, timeout=300, check=True)
-        ours, theirs = contents(log.with_suffix(".season")), contents(alone)
+    for log, jump in zip(logs, alone, strict=True):
+        ours, theirs = contents(log.with_suffix(".season")), contents(jump.result)
         assert ours.keys() == theirs.keys()
         assert [name for name in ours if ours[name] != theirs[name]] == []

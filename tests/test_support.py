@@ -3,6 +3,8 @@
 import re
 import subprocess
 import sys
+import time
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -198,3 +200,17 @@ def test_what_does_not_come_true_is_named() -> None:
 
 def test_a_short_path_is_short(short_path: Path) -> None:
     assert len(str(short_path / "publish.sock")) < 60
+
+
+def test_what_is_long_in_coming_is_looked_at_more_rarely() -> None:
+    looks: list[float] = []
+
+    def come() -> bool:
+        looks.append(time.monotonic())
+        return looks[-1] - looks[0] > 1.0
+
+    wait_until(come, "it has come", poll_s=0.001)
+    assert len(looks) < 400
+    apart = [after - before for before, after in pairwise(looks)]
+    assert all(gap >= 0.04 for gap in apart[-3:])
+    wait_until(lambda: True, "it is there at once", timeout_s=0)

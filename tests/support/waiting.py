@@ -2,6 +2,12 @@
 
 import time
 from collections.abc import Callable
+from typing import Final
+
+#: What is long in coming is looked at more rarely, after a further share of the time that was waited, but at least this
+#: often: a look may be a call of a service, and takes processor time that what is awaited would need.
+_SHARE: Final = 0.05
+_RAREST_S: Final = 0.1
 
 
 def wait_until(condition: Callable[[], bool], what: str, timeout_s: float = 5.0, poll_s: float = 0.01) -> None:
@@ -11,13 +17,14 @@ def wait_until(condition: Callable[[], bool], what: str, timeout_s: float = 5.0,
         condition: what is awaited.
         what: names the condition in the failure, e.g. "the grabber is gone".
         timeout_s: how long to wait at most.
-        poll_s: time between two looks.
+        poll_s: time between two looks, at first.
 
     Raises:
         AssertionError: the condition did not come true in time.
     """
-    deadline = time.monotonic() + timeout_s
+    begun = time.monotonic()
     while not condition():
-        if time.monotonic() > deadline:
+        waited = time.monotonic() - begun
+        if waited > timeout_s:
             raise AssertionError(f"after {timeout_s} s still not so: {what}")
-        time.sleep(poll_s)
+        time.sleep(max(poll_s, min(_SHARE * waited, _RAREST_S)))

@@ -68,7 +68,7 @@ def test_a_page_that_is_killed_again_and_again_loses_at_most_the_action_under_wa
             kept = client.get(base).raise_for_status().json()["revision"]
             assert kept in {answered, answered + 1}
             answered = kept
-            killer = threading.Timer(float(random.uniform(0.05, 0.5)), command.send_signal, (signal.SIGKILL,))
+            killer = threading.Timer(float(random.uniform(0.02, 0.2)), command.send_signal, (signal.SIGKILL,))
             killer.start()
             with suppress(httpx.TransportError):
                 while True:

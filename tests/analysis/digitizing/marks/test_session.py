@@ -146,9 +146,10 @@ def test_an_entry_that_was_cut_is_left_out_and_the_next_one_stands_in_its_place(
 _WRITER = """
 import sys
 from pathlib import Path
-from tests.analysis.digitizing.marks.test_session import opened
+from analysis.digitizing.marks.journal import SUFFIX, Journal
+from analysis.digitizing.marks.session import Session
 from rig.api.digitizing import PlaceAction
-session = opened(Path(sys.argv[1]))
+session = Session(Journal(Path(sys.argv[1]) / f"Anna{SUFFIX}", "jump-1", "Anna"))
 for number in range(session.revision, 10 ** 9):
     session.act(PlaceAction(do="place", pulse=number, camera="K1", thing="P1", xy=(number % 640, 1.0)))
     print(number, flush=True)

@@ -52,6 +52,22 @@ def test_other_inputs_and_other_sources_make_it_anew(place: Path, monkeypatch: p
     assert len([path for path in place.iterdir() if path.is_dir()]) == 3
 
 
+def test_what_it_depends_on_are_sources_and_settings_and_nothing_that_programs_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept, "_ROOT", tmp_path)
+    known: set[str] = set()
+    for name, new in {
+        "service/recordings/code.py": True, "config/rig.toml": True, "recordings/jump.mcap": False,
+        ".cache/tests/jump.mcap": False, "docs/page.md": False, "bench/results/1.json": False, "bench/results.py": True,
+    }.items():  # fmt: skip
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("1")
+        digest = kept._sources.__wrapped__()
+        assert (digest not in known) is (new or not known), name
+        known.add(digest)
+
+
 def test_what_was_begun_and_not_finished_is_made_anew(place: Path) -> None:
     def killed(folder: Path) -> None:
         (folder / "half").touch()

@@ -20,7 +20,9 @@ from simrig.world.scenario import Scenario
 
 _ROOT: Final = Path(__file__).resolve().parents[2]
 _KEPT: Final = _ROOT / ".cache" / "tests"
-_FOREIGN: Final = {"docs", "node_modules", "build", "dist", "__pycache__"}  # nothing that is kept depends on them
+#: Folders that nothing that is kept depends on: pages, what is made or installed, and what programs record here.
+_FOREIGN: Final = {"docs", "build", "dist", "recordings", "demo", "bench/results"}
+_FOREIGN_NAMES: Final = {"node_modules", "__pycache__"}
 _UNUSED_S: Final = 86_400.0  # after which what another content has made is removed
 
 
@@ -74,11 +76,15 @@ def _sources() -> str:
     """A digest of the contents of this checkout."""
     digest = hashlib.sha256()
     for folder, folders, files in os.walk(_ROOT):
-        folders[:] = sorted(each for each in folders if each not in _FOREIGN and not each.startswith("."))
+        here = Path(folder).relative_to(_ROOT)
+        folders[:] = sorted(
+            each
+            for each in folders
+            if not each.startswith(".") and each not in _FOREIGN_NAMES and str(here / each) not in _FOREIGN
+        )
         for file in sorted(files):
-            path = Path(folder, file)
-            digest.update(f"{path.relative_to(_ROOT)}\0".encode())
-            digest.update(hashlib.sha256(path.read_bytes()).digest())
+            digest.update(f"{here / file}\0".encode())
+            digest.update(hashlib.sha256(Path(folder, file).read_bytes()).digest())
     return digest.hexdigest()
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -91,11 +92,12 @@ def test_bindings_of_which_one_lies_ahead_of_the_other_are_not_told(ahead_m: flo
         elsewhere = replace(binding, xyz=binding.xyz + ahead_m * ski.direction)
         return replace(state, points={**state.points, "P3": elsewhere})
 
-    states = [pulse.raw for pulse in _computed(lambda _, pulse: pulse).pulses]
+    states = [pulse.raw for pulse in _whole().pulses]
     assert told_names(states) == set(POINTS)
     assert told_names([moved(state) for state in states]) == set(told.split())
 
 
+@cache
 def _measured() -> Measurements:
     return simulated_measurements(true_jump(3), true_cameras(), np.random.default_rng(3))
 
@@ -105,6 +107,12 @@ def _computed(change: Callable[[int, PulseMeasurements], PulseMeasurements]) -> 
     measured = _measured()
     changed = tuple(change(k, pulse) for k, pulse in enumerate(measured.jumps[0].pulses))
     return compute_jump(JumpMeasurements(1, changed), measured, true_cameras()).jump
+
+
+@cache
+def _whole() -> Jump:
+    """The jump from its measurements as they are."""
+    return _computed(lambda _, pulse: pulse)
 
 
 def test_a_camera_that_was_gone_contradicts_nobody() -> None:
@@ -132,7 +140,7 @@ def test_without_a_take_off_nothing_is_said_of_edge_and_flight() -> None:
 
 def test_a_raw_point_that_the_motion_contradicts_is_marked() -> None:
     """Measured by hand, so that it is not given up although it has two rays only."""
-    right, system, wrong = _computed(lambda _, pulse: pulse), true_cameras(), 20
+    right, system, wrong = _whole(), true_cameras(), 20
     state = right.pulses[wrong].smoothed
     assert state is not None
     point = state.points["P3"]
@@ -177,7 +185,7 @@ def _without(
 
 
 def test_measured_well_wants_all_points_controlled_in_four_of_five_pulses_in_sight() -> None:
-    whole = _computed(lambda _, pulse: pulse)
+    whole = _whole()
     assert whole.verdict.ok
     assert "controlled by a third camera in" in whole.verdict.message
     half = len(whole.pulses) // 2
@@ -202,7 +210,7 @@ def test_every_sentence_of_a_verdict_can_be_said_in_another_language() -> None:
     assert [each.code for each in doubtful.said] == ["jump_uncontrolled", "jump_counted"] or not doubtful.ok
     assert all(each.code and each.text in doubtful.message for each in doubtful.said)
     assert doubtful.message == "; ".join(map(str, doubtful.said[:-1])) + f" ({doubtful.said[-1]})"
-    good = _computed(lambda _, pulse: pulse).verdict
+    good = _whole().verdict
     assert good.message == f"measured well: {'; '.join(map(str, good.said))}"
     assert good.said[0].values.keys() == {"count", "pulses", "controlled"}
 

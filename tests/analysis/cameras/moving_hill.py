@@ -18,6 +18,7 @@ from simrig.images.view import CameraView
 from simrig.world.conditions.camera_motion import CameraMotion
 from simrig.world.scenario import Scenario
 from tests.analysis.scene.hill import RATE_HZ, SIZE, survey_json, survey_of, training
+from tests.support.kept import kept_object
 
 
 class Film:
@@ -78,4 +79,5 @@ def shaken_film() -> Film:
 @cache
 def shaken_scene() -> OrientedScene:
     """The scene of `shaken_film`."""
-    return shaken_film().scene()
+    found: OrientedScene = kept_object("shaken-scene", lambda: shaken_film().scene())
+    return found

@@ -19,6 +19,7 @@ from photogrammetry.reports.procedures import orientation_to_json
 from rig.errors import BadInputError
 from svev.cli import main
 from tests.analysis.scene.hill import oriented, survey_json, training, training_detections, training_images
+from tests.support.kept import kept_object
 
 
 @cache
@@ -26,7 +27,8 @@ def _surveyed() -> OrientedScene:
     data = survey_json(training(), 1)
     for camera in data["cameras"].values():
         camera |= {"estimate": ["c"], "sigma": {"c": 0.5}}
-    return scene_of_survey(oriented(data))
+    found: OrientedScene = kept_object("surveyed-scene", lambda: scene_of_survey(oriented(data)))
+    return found
 
 
 @cache

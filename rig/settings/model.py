@@ -148,15 +148,10 @@ class AnalysisSettings(StrictModel):
     calibration: Path | None = Field(
         None, description="poses of the cameras (result of svev orient), relative to the rig file"
     )
-    after_recording: tuple[Literal["measure", "video", "copy"], ...] = Field(
+    after_recording: tuple[Literal["measure", "video"], ...] = Field(
         ("measure",),
         description="what is done with every log by itself after its end: measure, then video (MP4 with the stick "
-        "figure), then copy (of log and result, to copy_to); [] for nothing",
-    )
-    copy_to: Path | None = Field(
-        None,
-        description="folder that logs and results are copied to, e.g. on a second disk, relative to the working "
-        "directory",
+        "figure); [] for nothing",
     )
 
     @model_validator(mode="after")
@@ -166,8 +161,6 @@ class AnalysisSettings(StrictModel):
             raise ValueError(f"after_recording: {steps[0]} comes after measure: write measure too")
         if len(set(steps)) < len(steps):
             raise ValueError("after_recording: a step stands twice: write it once")
-        if ("copy" in steps) != (self.copy_to is not None):
-            raise ValueError('a copy needs both, after_recording with "copy" and copy_to with the folder: write both')
         return self
 
     @model_validator(mode="after")
@@ -175,6 +168,15 @@ class AnalysisSettings(StrictModel):
         if (self.survey is None) == (self.calibration is None):
             raise ValueError("analysis needs the survey of the balls or the poses of the cameras: give one of them")
         return self
+
+
+class OffloadSettings(StrictModel):
+    """Copies of all recordings on another disk, made when nothing is recorded."""
+
+    to: Path = Field(
+        description="folder on another disk, a USB stick or a share that every recording is copied to with all that "
+        "belongs to it, relative to the working directory"
+    )
 
 
 class SimulationSettings(StrictModel):
@@ -195,6 +197,7 @@ class RigSettings(StrictModel):
     network: NetworkSettings = Field(NetworkSettings(), description="how frames are received and triplets published")
     service: ServiceSettings = Field(ServiceSettings(), description="what the service does by itself")
     analysis: AnalysisSettings | None = Field(None, description="measures the jumper, live and in every log")
+    offload: OffloadSettings | None = Field(None, description="copies every recording to another disk")
     automatic: AutomaticSettings = Field(AutomaticSettings(), description="recordings that begin by themselves")
     simulation: SimulationSettings | None = Field(None, description="simulated cameras instead of real ones")
     calibration: Path | None = Field(

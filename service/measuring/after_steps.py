@@ -22,6 +22,7 @@ from rig.settings.model import AnalysisSettings
 from service.measuring.keeping import keep_file, keep_problem, keep_renamed, keep_result, keep_step
 from service.measuring.results import VIDEO, names_of
 from service.measuring.retries import source_mark
+from service.offloading.notes import CopyNotes, mark_of
 
 #: Where results are made, before they are whole.
 _WORKSHOP: Final = ".measuring"
@@ -39,6 +40,7 @@ class AfterSteps:
         hold: called with True when it stands still, with False when it goes on.
         tell: takes an event for the live log.
         found: takes the main figures of the jumps of a log, when it is measured, before the files are there.
+        copies: what came of the copies on the other disk.
     """
 
     def __init__(
@@ -51,9 +53,11 @@ class AfterSteps:
         hold: Callable[[bool], None],
         tell: Callable[[Event], None],
         found: Callable[[tuple[LastJump, ...]], None],
+        copies: CopyNotes,
     ) -> None:
         self._folder, self._busy, self._earlier, self._wanted = folder, busy, earlier, wanted
         self._hear, self._hold, self._tell, self._found = hear, hold, tell, found
+        self._copies = copies
 
     def tidy(self) -> None:
         """Remove what an earlier service left half made."""
@@ -140,15 +144,22 @@ class AfterSteps:
         return True
 
     def copy(self, recording: str, log: Path, to: Path) -> None:
-        """Copy a log, measured or not, with all that belongs to it."""
+        """Copy a log, measured or not, with all that belongs to it; what failed is noted and told."""
         self._hear({"step": MeasuringStep.COPYING, "share": 0.0})
+        mark, why = mark_of(log), None
         asked = {"paths": [str(path) for path in (log, *beside(log))], "to": str(to)}
         try:
-            end = self._child(recording, "service.measuring.copying", asked, self._hear)
-            if end is not None and log.exists():
-                self._note(recording, log, AfterStep.COPY, end.get("problem"))
+            end = self._child(recording, "service.offloading.copying", asked, self._hear)
+            if end is None or not log.exists():
+                return
+            if (problem := end.get("problem")) is not None:
+                why = from_plain(problem)
         except (OSError, ValueError) as error:
-            self._warn(_not_copied(recording, plain(str(error))))
+            why = plain(str(error))
+        before = self._copies.of(recording)
+        self._copies.note(log, mark, None if why is None else _warning(why))
+        if why is not None and (before is None or before.problem is None or before.problem.text != why.text):
+            self._warn(_not_copied(recording, why))
 
     def _child(
         self, recording: str, module: str, asked: dict[str, Any], tell: Callable[[dict[str, Any]], None]
@@ -160,9 +171,7 @@ class AfterSteps:
         """Note what came of a further step, and tell if it failed."""
         why = None if problem is None else from_plain(problem)
         keep_step(log, step, None if why is None else _warning(why))
-        if why is not None and step is AfterStep.COPY:
-            self._warn(_not_copied(recording, why))
-        elif why is not None:
+        if why is not None:
             self._warn(phrase("event_no_video", "{recording} has no video: {why}", recording=recording, why=why))
 
     def _fail(self, recording: str, log: Path, why: Phrase, source: str | None = None) -> None:

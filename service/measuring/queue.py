@@ -1,7 +1,9 @@
 """The logs that wait to be measured: one after the other, the last jump first, none while a recording runs.
 
 A log is queued when it is opened, and measured when it is closed; then come the further steps that the rig file asks
-for. None is forgotten: a service that was killed, or a computer without power, goes on with the queue.
+for. None is forgotten: a service that was killed, or a computer without power, goes on with the queue. When nothing is
+to be measured, recordings are copied to the other disk that `[offload]` names; those that are not there yet, or have
+changed since, are found by looking.
 """
 
 import threading
@@ -22,6 +24,7 @@ from rig.events import Level as EventLevel
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from service.measuring.after_steps import AfterSteps
+from service.measuring.copies import Copies
 from service.measuring.results import is_outdated, measurement_of
 from service.measuring.retries import Retries
 from service.measuring.waiting import WaitingLogs
@@ -33,7 +36,7 @@ _WATCH_S: Final = 2.0
 _SEEN: Final = 0.05
 _END_S: Final = 10.0
 #: What is at work in these steps; in all others the log is measured.
-_AT_WORK: Final = {MeasuringStep.VIDEO: AfterStep.VIDEO, MeasuringStep.COPYING: AfterStep.COPY}
+_AT_WORK: Final = {MeasuringStep.VIDEO: AfterStep.VIDEO}
 #: Why nothing can be measured, and what to do.
 _UNKNOWN: Final = (
     "nothing says where the balls are: give the rig file an [analysis] with survey or calibration, and restart the "
@@ -68,12 +71,15 @@ class Measurings:
         self._tell = tell
         self._waiting = WaitingLogs(folder, tell)
         self._names = WaitingLogs(folder, tell)  # results whose files say a corrected name: they tell so themselves
+        self._copies = Copies(folder, in_use, tell)
         self._at = self._waiting  # what the log stands in that is at work
         self._retries = Retries(folder, in_use)
         self._running: MeasuringQueue | None = None
         self._figures: tuple[LastJump, ...] = ()  # of what is running
         self._found = found
-        self._after = AfterSteps(folder, busy, earlier, self._wanted, self._hear, self._hold, tell, self._know)
+        self._after = AfterSteps(
+            folder, busy, earlier, self._wanted, self._hear, self._hold, tell, self._know, self._copies.notes
+        )
         self._lock = threading.Lock()
         self._bell, self._closed = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="measuring", daemon=True)
@@ -92,11 +98,13 @@ class Measurings:
 
         It comes before those that wait: people at the hill look at the last jump.
         """
-        analysis = self._in_use().analysis
-        if log.parent != self._folder or analysis is None or not analysis.after_recording:
+        rig = self._in_use()
+        if log.parent != self._folder:
             return
-        with suppress(StateForbidsError):  # two thousand wait: this one is measured when somebody asks
-            self._waiting.add(log.stem, first=True)
+        if rig.analysis is not None and rig.analysis.after_recording:
+            with suppress(StateForbidsError):  # two thousand wait: this one is measured when somebody asks
+                self._waiting.add(log.stem, first=True)
+        self._copies.want(log.stem)
         self._bell.set()
 
     def renamed(self, recording: str, log: Path) -> None:
@@ -139,8 +147,11 @@ class Measurings:
             what, _, advice = _UNKNOWN.partition(": ")
             refused = Statement(level=Level.INFO, code="no_analysis", text=what, advice=advice)
             known = known.model_copy(update={"refused": refused})
+        copy = self._copies.step(recording, running)
+        if running is not None and running.step is MeasuringStep.COPYING:
+            running = None
         if recording not in ids:
-            return known
+            return known.model_copy(update={"steps": (*known.steps, *copy)})
         if running is None or running.recording != recording:
             others = [other for other in ids if running is None or other != running.recording]
             before = others.index(recording) + (running is not None)
@@ -152,7 +163,7 @@ class Measurings:
                 update["state"] = known.state
             elif self._figures and not known.files:
                 update |= {"figures": self._figures, "live": False}
-        return known.model_copy(update=update | {"steps": self._steps(known, running)})
+        return known.model_copy(update=update | {"steps": (*self._steps(known, running), *copy)})
 
     def _steps(self, known: Measurement, running: MeasuringQueue | None) -> tuple[StepState, ...]:
         """How far the steps of a log are that waits, or is at work."""
@@ -186,13 +197,18 @@ class Measurings:
             self.renamed(log.stem, log)
         while not self._closed.is_set():
             self._retry()
+            if not self._busy():
+                self._copies.look()
             self._waiting.keep()
             if (recording := self._next(self._names)) is not None:
                 self._rename(recording)
             elif (recording := self._next(self._waiting)) is not None:
                 self._work(recording)
+            elif (recording := self._next(self._copies.waiting)) is not None:
+                self._copy(recording)
             else:
-                self._bell.wait(_LOOK_S if self._waiting.ids or self._names.ids else _WATCH_S)
+                waiting = self._waiting.ids or self._names.ids or self._copies.waiting.ids
+                self._bell.wait(_LOOK_S if waiting else _WATCH_S)
                 self._bell.clear()
                 continue
             self._changed()
@@ -232,9 +248,8 @@ class Measurings:
             if analysis is not None:  # else another rig file, since it was queued
                 self._after.measure(recording, log, analysis)
                 self._retries.look_again()
-                if analysis.copy_to is not None and self._wanted(recording):
-                    self._after.copy(recording, log, analysis.copy_to)
             if not self._closed.is_set():
+                self._copies.want(recording)
                 self._waiting.remove(recording)
                 self._waiting.keep()
 
@@ -248,11 +263,18 @@ class Measurings:
             return
         with self._at_work(recording, self._names):
             done = self._after.rename(recording, log)
-            if done and analysis is not None and analysis.copy_to is not None:
-                self._after.copy(recording, log, analysis.copy_to)
             self._names.remove(recording)
         if done:  # perhaps corrected once more meanwhile
             self.renamed(recording, log)
+            self._copies.want(recording)
+
+    def _copy(self, recording: str) -> None:
+        log, offload = self._log(recording), self._in_use().offload
+        with self._at_work(recording, self._copies.waiting):
+            if offload is not None:  # else another rig file, since it was queued
+                self._after.copy(recording, log, offload.to)
+            if self._wanted(recording):
+                self._copies.waiting.remove(recording)
 
     @contextmanager
     def _at_work(self, recording: str, waiting: WaitingLogs) -> Iterator[None]:
@@ -267,6 +289,8 @@ class Measurings:
                 self._running = None
 
     def _wanted(self, recording: str) -> bool:
+        if self._at is self._copies.waiting and self._next(self._waiting) is not None:
+            return False  # people wait for a jump: the copy goes on behind it
         return recording in self._at and not self._closed.is_set()
 
     def _hold(self, held: bool) -> None:

@@ -39,6 +39,7 @@ def measurement_of(recording: str, log: Path) -> Measurement:
         steps=tuple(
             StepState(step=step, state=_state(problem), problem=problem)
             for step, problem in ((AfterStep.MEASURE, found.problem), *found.further)
+            if step is not AfterStep.COPY  # noted by earlier versions
         ),
         measured=found.measured,
         version=found.version,

@@ -364,10 +364,7 @@ PATHS: dict[str, tuple[str, Callable[[Any], Path]]] = {
     "NetworkSettings.curve_key_file": ("[network]\ncurve_key_file = '{}'\n", lambda rig: rig.network.curve_key_file),
     "AnalysisSettings.survey": ("[analysis]\nsurvey = '{}'\n", lambda rig: rig.analysis.survey),
     "AnalysisSettings.calibration": ("[analysis]\ncalibration = '{}'\n", lambda rig: rig.analysis.calibration),
-    "AnalysisSettings.copy_to": (
-        "[analysis]\nsurvey = 's'\nafter_recording = ['measure', 'copy']\ncopy_to = '{}'\n",
-        lambda rig: rig.analysis.copy_to,
-    ),
+    "OffloadSettings.to": ("[offload]\nto = '{}'\n", lambda rig: rig.offload.to),
     "WebhookSettings.url_file": ("[service.webhook]\nurl_file = '{}'\n", lambda rig: rig.service.webhook.url_file),
     "WebhookSettings.token_file": (
         "[service.webhook]\nurl = 'https://club.example/x'\ntoken_file = '{}'\n",

@@ -43,6 +43,7 @@ _TABLES: Final = (
     ("`[service]`", "ServiceSettings"),
     ("`[service.webhook]`", "WebhookSettings"),
     ("`[analysis]`", "AnalysisSettings"),
+    ("`[offload]`", "OffloadSettings"),
     ("`[automatic]`", "AutomaticSettings"),
     ("`[automatic.motion]`", "MotionSettings"),
     ("`[automatic.barrier]`", "BarrierSettings"),

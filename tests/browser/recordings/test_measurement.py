@@ -166,7 +166,7 @@ def test_each_step_after_a_recording_is_shown_with_its_state(
     log = service.catalogue.file("jump-2")
     missing = Statement(level=Level.WARNING, code="storage", text="/backup: the folder for copies is not there")
     keep_step(log, AfterStep.VIDEO, None)
-    keep_step(log, AfterStep.COPY, missing)
+    service.measurings._copies.notes.note(log, "", missing)
     page = open_page(f"{panel.url}/#/recordings/jump-2")
     steps = page.locator("#measurement-steps li")
     expect(steps).to_have_text(["Measured: done", "Video: done", re.compile("^Copy: failed.*/backup: the folder")])
@@ -208,6 +208,9 @@ def test_the_live_view_says_whose_jump_was_last_how_it_was_and_how_many_wait(
     expect(jumper).to_have_text("17 · Anna Berg")
     expect(page.locator("#measured-far")).to_have_text("Still measuring")
     expect(queue).to_have_text("measuring 1, waiting 2")
+    service.measuring = service.measurings._running.model_copy(update={"step": MeasuringStep.COPYING, "paused": True})
+    service._wake()
+    expect(queue).to_have_text("copying 1 (waits while a recording runs), waiting 2")
     for hidden in ("#measured-figures", "#measured-verdict", "#measured-why"):
         expect(page.locator(hidden)).to_be_hidden()
     card.scroll_into_view_if_needed()

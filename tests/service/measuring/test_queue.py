@@ -22,7 +22,7 @@ from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringState
 from rig.errors import StateForbidsError, StorageError
 from rig.events import Event
-from rig.settings.model import AnalysisSettings
+from rig.settings.model import AnalysisSettings, OffloadSettings
 from service.measuring.queue import Measurings
 from service.measuring.waiting import NAME
 from service.recordings import live_results
@@ -52,6 +52,7 @@ class Bench:
         busy: whether a recording runs.
         survey: what the rig file names; None: it has no `[analysis]`.
         further: what else stands under `[analysis]`.
+        copied_to: folder that `[offload]` names; None: there is no such table.
         found: recordings whose jumps were told.
         shown: what was known of each of them then.
         said: the events.
@@ -61,6 +62,7 @@ class Bench:
     def __init__(self, folder: Path, survey: Path | None) -> None:
         self.folder, self.busy, self.survey = folder, False, survey
         self.further: dict[str, Any] = {}
+        self.copied_to: Path | None = None
         self.found: list[str] = []
         self.shown: list[Measurement] = []
         self.said: list[str] = []
@@ -70,7 +72,8 @@ class Bench:
     def running(self) -> Iterator[Measurings]:
         """A service that measures."""
         analysis = self.survey and AnalysisSettings(survey=self.survey, **self.further)
-        rig = SIM.model_copy(update={"analysis": analysis})
+        offload = self.copied_to and OffloadSettings(to=self.copied_to)
+        rig = SIM.model_copy(update={"analysis": analysis, "offload": offload})
         with Measurings(
             self.folder, lambda: rig, lambda: self.busy, self.earlier, self._hear, self._know, lambda: None
         ) as self._queue:
@@ -260,7 +263,7 @@ def test_a_queue_that_cannot_be_read_is_said(bench: Bench) -> None:
 @pytest.mark.alone
 def test_after_the_measuring_come_a_video_and_a_copy_on_another_disk(bench: Bench, tmp_path: Path) -> None:
     other = tmp_path / "other disk"
-    bench.further = {"after_recording": ("measure", "video", "copy"), "copy_to": other}
+    bench.further, bench.copied_to = {"after_recording": ("measure", "video")}, other
     with bench.running() as queue:
         queue.opened(bench.log("jump"))
         seen, figures = set(), 0
@@ -271,12 +274,12 @@ def test_after_the_measuring_come_a_video_and_a_copy_on_another_disk(bench: Benc
             if ("video", "measuring") in _states(now):
                 figures = max(figures, len(now.figures))
             wait_until(lambda now=now: bench.of(queue, "jump") != now or not bench.waiting(), "it goes on", PATIENCE_S)  # type: ignore[misc]
+        wait_until(lambda: _states(bench.of(queue, "jump"))[-1] == ("copy", "failed"), "there is no disk", PATIENCE_S)
         without_a_disk = bench.of(queue, "jump")
         assert figures == 1, "they do not wait for the video"
         assert not list(tmp_path.glob("other disk*"))  # nothing is made where a disk is not connected
         other.mkdir()
-        queue.want("jump", bench.log("jump"))
-        wait_until(lambda: (other / "jump.measured").exists() and not bench.waiting(), "it is copied", PATIENCE_S)
+        wait_until(lambda: _states(bench.of(queue, "jump"))[-1] == ("copy", "done"), "it is copied", PATIENCE_S)
         copied = bench.of(queue, "jump")
     assert without_a_disk.state is MeasuringState.DONE
     assert (("measure", "measuring"), ("video", "waiting"), ("copy", "waiting")) in seen
@@ -303,16 +306,43 @@ def test_another_log_of_the_same_name_is_not_written_over(bench: Bench, tmp_path
     other = tmp_path / "other"
     other.mkdir()
     (other / "jump.mcap").write_bytes(b"of another computer")
-    bench.further, bench.survey = {"after_recording": ("measure", "copy"), "copy_to": other}, tmp_path / "none.json"
+    bench.copied_to, bench.survey = other, tmp_path / "none.json"
     with bench.running() as queue:
         queue.opened(bench.log("jump"))
-        bench.until_over(queue, "jump")
-        wait_until(lambda: not bench.waiting(), "the copy is over too", PATIENCE_S)
+        over = [("measure", "failed"), ("copy", "failed")]
+        wait_until(lambda: _states(bench.of(queue, "jump")) == over, "both are tried", PATIENCE_S)
         failed = bench.of(queue, "jump")
-    assert _states(failed) == [("measure", "failed"), ("copy", "failed")]
     assert failed.steps[-1].problem is not None
     assert "another log of this name" in failed.steps[-1].problem.text
     assert (other / "jump.mcap").read_bytes() == b"of another computer"
+
+
+def test_recordings_are_copied_where_nothing_is_measured_and_again_when_they_change(
+    bench: Bench, tmp_path: Path
+) -> None:
+    other = tmp_path / "other"
+    bench.copied_to, bench.survey, bench.busy = other, None, True
+
+    def state() -> list[tuple[str, str]]:
+        return _states(bench.of(queue, "jump"))
+
+    with bench.running() as queue:
+        queue.opened(bench.log("jump"))
+        assert state() == [("copy", "waiting")]
+        bench.busy = False
+        wait_until(lambda: state() == [("copy", "failed")], "there is no disk", PATIENCE_S)
+        assert any("jump is not copied: " in said and "is not there" in said for said in bench.said)
+        other.mkdir()
+        wait_until(lambda: state() == [("copy", "done")], "the disk has come", PATIENCE_S)
+    assert (other / "jump.mcap").read_bytes() == bench.log("jump").read_bytes()
+    written = (other / "jump.mcap").stat()
+    with bench.running() as queue:
+        assert state() == [("copy", "done")]
+        write_session_changes(bench.log("jump"), {"athlete": "Kari"})
+    with bench.running() as queue:
+        wait_until((other / "jump.session.json").exists, "the correction is copied", PATIENCE_S)
+        wait_until(lambda: state() == [("copy", "done")], "it is noted", PATIENCE_S)
+    assert (other / "jump.mcap").stat() == written
 
 
 def test_nothing_is_done_by_itself_where_nobody_wants_it(bench: Bench) -> None:
@@ -328,8 +358,6 @@ def test_nothing_is_done_by_itself_where_nobody_wants_it(bench: Bench) -> None:
     [
         ({"after_recording": ("video",)}, "video comes after measure"),
         ({"after_recording": ("measure", "measure")}, "a step stands twice"),
-        ({"after_recording": ("measure", "copy")}, "a copy needs both"),
-        ({"copy_to": Path("/x")}, "a copy needs both"),
     ],
 )
 def test_steps_that_cannot_be_are_refused_with_what_to_write(wrong: dict[str, Any], said: str) -> None:

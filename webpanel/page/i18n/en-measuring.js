@@ -9,7 +9,9 @@ export const words = {
   "measured.angle_of_attack": "Angle of attack, 0.5 s",
   "measured.ski_to_body": "Ski to body, 0.5 s",
   "measured.queue_running": "measuring 1",
-  "measured.queue_paused": "measuring 1 (waits while a recording runs)",
+  "measured.queue_copying": "copying 1",
+  "measured.queue_copying_paused": "copying 1 (waits while a recording runs)",
+  "measured.queue_running_paused": "measuring 1 (waits while a recording runs)",
   "measured.queue_waiting": "waiting {count}",
 
   "measurement.title": "Measurement",

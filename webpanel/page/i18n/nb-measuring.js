@@ -9,7 +9,9 @@ export const words = {
   "measured.angle_of_attack": "Angrepsvinkel, 0,5 s",
   "measured.ski_to_body": "Ski mot kropp, 0,5 s",
   "measured.queue_running": "måler 1",
-  "measured.queue_paused": "måler 1 (venter mens det tas opp)",
+  "measured.queue_copying": "kopierer 1",
+  "measured.queue_copying_paused": "kopierer 1 (venter mens det tas opp)",
+  "measured.queue_running_paused": "måler 1 (venter mens det tas opp)",
   "measured.queue_waiting": "{count} venter",
 
   "measurement.title": "Måling",

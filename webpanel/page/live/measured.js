@@ -51,11 +51,12 @@ function draw() {
   fillFigures($("measured-figures"), figures);
 }
 
-/** How many logs are being measured, and wait; empty if there are none. */
+/** How many logs are being measured or copied, and wait; empty if there are none. */
 function queueInWords() {
   const measuring = known.status?.measuring;
   if (!measuring) return "";
-  const running = measuring.recording === null ? "" : t(measuring.paused ? "measured.queue_paused" : "measured.queue_running");
+  const work = measuring.step === "copying" ? "copying" : "running";
+  const running = measuring.recording === null ? "" : t(`measured.queue_${measuring.paused ? `${work}_paused` : work}`);
   const waiting = measuring.waiting > 0 ? t("measured.queue_waiting", { count: measuring.waiting }) : "";
   return [running, waiting].filter(Boolean).join(", ");
 }

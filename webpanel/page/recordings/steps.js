@@ -15,7 +15,7 @@ const LEVELS = { none: "info", waiting: "info", measuring: "info", done: "good",
  * @returns {HTMLElement[]} list items
  */
 export function makeSteps(steps) {
-  if (steps.length < 2) return [];
+  if (steps.every(({ step }) => step === "measure")) return [];
   return steps.map(({ step, state, problem }) => {
     const level = LEVELS[state];
     const why = step !== "measure" && problem ? say(problem) : null;

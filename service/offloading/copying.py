@@ -1,4 +1,4 @@
-"""The program that copies a log and all that belongs to it elsewhere, started by `service.measuring.after_steps`.
+"""The program that copies a log and all that belongs to it elsewhere, started by `service.measuring.queue`.
 
 A log counts as copied when it was read back from the other disk and its checksum stands beside it, in the form that
 `sha256sum --check` reads.
@@ -14,7 +14,7 @@ from rig.background.program import Teller, serve
 from rig.errors import StorageError
 from rig.host.disk import ask_free_bytes, replace_file, sync
 from rig.phrase import phrase
-from service.measuring.verified_copy import checksum, copy_file
+from service.offloading.verified_copy import checksum, copy_file
 
 _LOG: Final = ".mcap"
 _SUM: Final = ".sha256"
@@ -24,13 +24,8 @@ def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     """Copy the files and folders of `paths` into the folder `to`, each whole or absent; what is there already stays."""
     to = Path(asked["to"])
     if not to.is_dir():
-        raise StorageError(
-            phrase(
-                "copying_no_folder",
-                "{folder}: the folder for copies is not there; connect its disk, then measure again",
-                folder=str(to),
-            )
-        )
+        text = "{folder}: the folder for copies is not there; connect its disk, and the copy is made"
+        raise StorageError(phrase("copying_no_folder", text, folder=str(to)))
     sources = [Path(each) for each in asked["paths"]]
     wanted = [source for source in sources if source.exists() and not _is_copied(source, to / source.name)]
     sizes = sum(path.stat().st_size for source in wanted for path in _files(source))
@@ -39,7 +34,7 @@ def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
         raise StorageError(
             phrase(
                 "copying_no_room",
-                "{folder}: has not the {gb:.1f} GB free that the copy takes; make room, then measure again",
+                "{folder}: has not the {gb:.1f} GB free that the copy takes; make room there, and the copy is made",
                 folder=str(to),
                 gb=(sizes - there) / 1e9,
             )
@@ -107,7 +102,7 @@ def _is_copied(source: Path, target: Path) -> bool:
 
 
 def _another(target: Path) -> StorageError:
-    text = "{path}: is another log of this name; move it away, then measure again"
+    text = "{path}: is another log of this name; move it away, and the copy is made"
     return StorageError(phrase("copying_other_log", text, path=str(target)))
 
 

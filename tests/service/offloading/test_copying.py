@@ -15,8 +15,8 @@ import pytest
 from rig.background.child import run_child
 from rig.errors import StorageError
 from rig.transport.launcher import program_command, program_environment
-from service.measuring import verified_copy
-from service.measuring.verified_copy import copy_file
+from service.offloading import verified_copy
+from service.offloading.verified_copy import copy_file
 from tests.support.waiting import wait_until
 
 DATA = np.random.default_rng(3).bytes(9_000_000)
@@ -24,7 +24,7 @@ DATA = np.random.default_rng(3).bytes(9_000_000)
 
 def _copy(*paths: Path, to: Path, busy: Callable[[], bool] = lambda: False) -> dict[str, Any]:
     end = run_child(
-        "service.measuring.copying", {"paths": [str(path) for path in paths], "to": str(to)},
+        "service.offloading.copying", {"paths": [str(path) for path in paths], "to": str(to)},
         busy=busy, wanted=lambda: True, tell=lambda _: None, hold=lambda _: None, yielding=False,
     )  # fmt: skip
     assert end is not None
@@ -103,7 +103,7 @@ def test_a_killed_copy_leaves_no_log_and_goes_on(places: tuple[Path, Path]) -> N
     part = there / ".jump.mcap.part"
     asked = json.dumps({"paths": [str(log)], "to": str(there)}) + "\n"
     with subprocess.Popen(
-        [*program_command("service.measuring.copying"), "at-once"],
+        [*program_command("service.offloading.copying"), "at-once"],
         stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, env=program_environment(),
     ) as program:  # fmt: skip
         assert program.stdin is not None

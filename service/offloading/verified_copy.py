@@ -53,8 +53,7 @@ def copy_file(source: Path, part: Path, told: Callable[[int], None]) -> str:
     if checksum(part, told) != wanted:
         part.unlink()
         raise StorageError(
-            f"{part.parent}: what was read back of {source.name} is not what was written; examine that disk, then "
-            "measure again"
+            f"{part.parent}: what was read back of {source.name} is not what was written; take another disk"
         )
     return wanted
 

@@ -1,5 +1,6 @@
 """What many tests share is made once, by one of the processes that want it, and made anew when its inputs change."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -66,6 +67,14 @@ def test_what_it_depends_on_are_sources_and_settings_and_nothing_that_programs_w
         digest = kept._sources.__wrapped__()
         assert (digest not in known) is (new or not known), name
         known.add(digest)
+
+
+def test_what_nobody_has_used_for_long_is_removed(place: Path) -> None:
+    folders = [kept.kept(name, lambda folder: (folder / "log").touch()) for name in ("old", "young")]
+    os.utime(folders[0], (0, 0))
+    os.utime(place / f"{folders[0].name}.lock", (0, 0))
+    kept.kept("third", lambda folder: (folder / "log").touch())
+    assert {path.name.split("-")[0] for path in place.iterdir()} == {"young", "third"}
 
 
 def test_what_was_begun_and_not_finished_is_made_anew(place: Path) -> None:

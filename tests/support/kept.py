@@ -11,6 +11,7 @@ import pickle
 import shutil
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -23,7 +24,7 @@ _KEPT: Final = _ROOT / ".cache" / "tests"
 #: Folders that nothing that is kept depends on: pages, what is made or installed, and what programs record here.
 _FOREIGN: Final = {"docs", "build", "dist", "recordings", "demo", "bench/results"}
 _FOREIGN_NAMES: Final = {"node_modules", "__pycache__"}
-_UNUSED_S: Final = 86_400.0  # after which what another content has made is removed
+_UNUSED_S: Final = 7200.0  # longer than a run of the tests: then what was made of another content is removed
 
 
 def kept(name: str, make: Callable[[Path], None], *inputs: object) -> Path:
@@ -40,7 +41,7 @@ def kept(name: str, make: Callable[[Path], None], *inputs: object) -> Path:
     with (_KEPT / f"{name}-{digest}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not folder.exists():
-            _remove_unused(name)
+            _remove_unused()
             partial = folder.with_name(f"{folder.name}.partial")
             shutil.rmtree(partial, ignore_errors=True)  # of a run that was killed
             partial.mkdir()
@@ -88,7 +89,9 @@ def _sources() -> str:
     return digest.hexdigest()
 
 
-def _remove_unused(name: str) -> None:
-    for old in _KEPT.glob(f"{name}-*"):
-        if time.time() - old.stat().st_mtime > _UNUSED_S:
-            shutil.rmtree(old) if old.is_dir() else old.unlink()
+def _remove_unused() -> None:
+    """Logs are large, and a day of work has many contents; several processes may look at once."""
+    for old in _KEPT.iterdir():
+        with suppress(FileNotFoundError):
+            if time.time() - old.stat().st_mtime > _UNUSED_S:
+                shutil.rmtree(old) if old.is_dir() else old.unlink()

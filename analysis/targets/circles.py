@@ -31,12 +31,27 @@ _STEP: Final = 4  # px: windows of about one size are fitted together
 _TWICE: Final = 2  # the offset is a hundredth of a pixel or two: computed again with the better homography it is exact
 
 
+def measurable(square: Floats, size: tuple[int, int]) -> bool:
+    """Whether a picture shows a target's discs, and so that they can be measured: whole, and no mere streaks.
+
+    Args:
+        square: (4, 2) px where the centres are about, clockwise from the top left.
+        size: width, height of the picture (px).
+    """
+    if not np.all((square >= 0.0) & (square <= np.array(size) - 1.0)) or not cv2.isContourConvex(
+        square.astype(np.float32)
+    ):
+        return False
+    axes = np.linalg.svd(_shapes(_homography(square)), compute_uv=False)
+    return bool(axes.min() > _SMALLEST and _WINDOW * axes.max() < min(size) / 2.0)
+
+
 def measure_circles(grey: NDArray[np.float32], squares: Floats) -> Measured:
     """Measure the centres of the discs of targets.
 
     Args:
         grey: (rows, columns).
-        squares: (n, 4, 2) px where the centres are about, clockwise from the top left; at most half a radius off.
+        squares: (n, 4, 2) px where the centres are about, at most half a radius off; all of them `measurable`.
 
     Returns:
         4 n centres, target by target.
@@ -99,7 +114,7 @@ def _fitted_discs(grey: NDArray[np.float32], start: Floats, shape: Floats, radiu
     dx, dy = (part.ravel().astype(float) for part in np.meshgrid(side, side))
     edge = np.array(grey.shape[::-1]) - 1 - radius
     middle = np.rint(start).astype(np.intp)
-    fits = np.all((middle >= radius) & (middle <= edge), axis=1) & (np.linalg.norm(shape, -2, axis=(1, 2)) > _SMALLEST)
+    fits = np.all((middle >= radius) & (middle <= edge), axis=1)
     wide = np.pad(grey, radius, mode="edge")
     row, column = (np.clip(middle[:, k], 0, grey.shape[1 - k] - 1) + radius for k in (1, 0))
     values = wide[row[:, None] + dy.astype(np.intp), column[:, None] + dx.astype(np.intp)].astype(float)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.targets.circles import measure_circles
+from analysis.targets.circles import measurable, measure_circles
 from analysis.targets.corners import LARGEST, SMALLEST, measure_corners
 from analysis.targets.pattern import CORNERS, DICTIONARY, FIRST_CIRCLES, MARKER, Layout
 from rig.arrays import Floats
@@ -76,7 +76,7 @@ def find_targets(image: Grey, layout: Layout, name: str) -> Sight:
     if not found:
         return Sight(size, {}, {}, (), bool(_markers(np.ascontiguousarray(eight[:, ::-1]), layout)), np.nan)
     squares = {code: square for code, square in targets.items() if code < FIRST_CIRCLES}
-    circles = {code: square for code, square in targets.items() if code >= FIRST_CIRCLES}
+    circles = {code: square for code, square in targets.items() if code >= FIRST_CIRCLES and measurable(square, size)}
     grey = np.asarray(image, np.float32)
     corners, blur = _measured(grey, _wanted(squares, layout, name), circles, layout)
     return Sight(size, corners, targets, doubled, mirrored=False, blur=blur)

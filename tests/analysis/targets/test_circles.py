@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.targets.circles import projected_centres
+from analysis.targets.circles import measurable, projected_centres
 from analysis.targets.pattern import CORNERS, DISC
 from tests.analysis.targets.drawn import Array, DrawnCamera, looking
 
@@ -14,6 +14,21 @@ def _pictured(camera: DrawnCamera, pose: tuple[Array, Array], places: Array) -> 
     """(n, 2) px of places (n, 2) on a target's plane, in units of its side; y points down."""
     k = (np.column_stack((places * (_SIDE, -_SIDE), np.zeros(len(places)))) - pose[0]) @ pose[1]
     return np.asarray(-camera.c * k[:, :2] / k[:, 2:] * (1.0, -1.0))
+
+
+@pytest.mark.parametrize(
+    "square",
+    [
+        [(100, 100), (300, 100), (300, 300), (-1, 300)],  # one is outside
+        [(100, 100), (114, 100), (114, 114), (100, 114)],  # discs smaller than four pixels
+        [(100, 100), (300, 100), (150, 120), (100, 300)],  # no picture of a square
+        [(np.nan, 100), (300, 100), (300, 300), (100, 300)],
+        [(10, 10), (630, 10), (321, 470), (319, 470)],  # its plane is seen from the edge
+    ],
+)
+def test_what_cannot_be_measured_is_left_alone(square: list[tuple[float, float]]) -> None:
+    assert not measurable(np.array(square, dtype=float), (640, 480))
+    assert measurable(np.array([(100, 100), (300, 110), (310, 300), (100, 320)], dtype=float), (640, 480))
 
 
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)

@@ -177,6 +177,23 @@ class OffloadSettings(StrictModel):
         description="folder on another disk, a USB stick or a share that every recording is copied to with all that "
         "belongs to it, relative to the working directory"
     )
+    keep_days: float | None = Field(
+        None,
+        gt=0,
+        description="recordings that are older go into the trash when they are safe in that folder; nothing is deleted "
+        "without a rule",
+    )
+    keep_free_GB: float | None = Field(  # noqa: N815 - a unit
+        None,
+        gt=0,
+        description="the oldest recordings that are safe in that folder go into the trash while less than this is free "
+        "here, 10^9 bytes; what lies in the trash counts as free",
+    )
+
+    @property
+    def releases(self) -> bool:
+        """Whether any rule lets recordings go."""
+        return self.keep_days is not None or self.keep_free_GB is not None
 
 
 class SimulationSettings(StrictModel):

@@ -11,7 +11,6 @@ from recorder.catalogue.trash import beside
 from recorder.log.measured_path import measured_path
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, MeasuringStep
-from rig.api.statement import Level, Statement
 from rig.background.child import run_child
 from rig.errors import StorageError
 from rig.events import Event
@@ -22,7 +21,7 @@ from rig.settings.model import AnalysisSettings
 from service.measuring.keeping import keep_file, keep_problem, keep_renamed, keep_result, keep_step
 from service.measuring.results import VIDEO, names_of
 from service.measuring.retries import source_mark
-from service.offloading.notes import CopyNotes, mark_of
+from service.offloading.notes import CopyNotes, as_warning, mark_of
 
 #: Where results are made, before they are whole.
 _WORKSHOP: Final = ".measuring"
@@ -157,7 +156,7 @@ class AfterSteps:
         except (OSError, ValueError) as error:
             why = plain(str(error))
         before = self._copies.of(recording)
-        self._copies.note(log, mark, None if why is None else _warning(why))
+        self._copies.note(log, mark, None if why is None else as_warning(why))
         if why is not None and (before is None or before.problem is None or before.problem.text != why.text):
             self._warn(_not_copied(recording, why))
 
@@ -170,7 +169,7 @@ class AfterSteps:
     def _note(self, recording: str, log: Path, step: AfterStep, problem: dict[str, Any] | None) -> None:
         """Note what came of a further step, and tell if it failed."""
         why = None if problem is None else from_plain(problem)
-        keep_step(log, step, None if why is None else _warning(why))
+        keep_step(log, step, None if why is None else as_warning(why))
         if why is not None:
             self._warn(phrase("event_no_video", "{recording} has no video: {why}", recording=recording, why=why))
 
@@ -178,7 +177,7 @@ class AfterSteps:
         """Note that a log cannot be measured, and by which content of survey or poses, if they are the reason."""
         with suppress(FileNotFoundError):  # deleted meanwhile
             try:
-                keep_problem(log, _warning(why), source)
+                keep_problem(log, as_warning(why), source)
             except FileNotFoundError:
                 raise
             except OSError as error:
@@ -197,7 +196,3 @@ def _not_renamed(recording: str, why: Phrase) -> Phrase:
 
 def _not_copied(recording: str, why: Phrase) -> Phrase:
     return phrase("event_log_not_copied", "{recording} is not copied: {why}", recording=recording, why=why)
-
-
-def _warning(why: Phrase) -> Statement:
-    return Statement(level=Level.WARNING, code=why.code, text=why.text, values=why.values)

@@ -28,6 +28,7 @@ from service.measuring.copies import Copies
 from service.measuring.results import is_outdated, measurement_of
 from service.measuring.retries import Retries
 from service.measuring.waiting import WaitingLogs
+from service.offloading.releasing import Releasing, Removal
 
 _LOOK_S: Final = 0.2
 #: So often survey or poses are looked at while nothing waits.
@@ -55,6 +56,7 @@ class Measurings:
         tell: takes an event for the live log.
         found: takes the main figures of the jumps of a log, when it is measured, before its files are there.
         changed: called when something has changed that people see.
+        removal: how recordings are removed that are safe on another disk.
     """
 
     def __init__(
@@ -66,12 +68,14 @@ class Measurings:
         tell: Callable[[Event], None],
         found: Callable[[tuple[LastJump, ...]], None],
         changed: Callable[[], None],
+        removal: Removal,
     ) -> None:
         self._folder, self._in_use, self._busy, self._changed = folder, in_use, busy, changed
         self._tell = tell
         self._waiting = WaitingLogs(folder, tell)
         self._names = WaitingLogs(folder, tell)  # results whose files say a corrected name: they tell so themselves
         self._copies = Copies(folder, in_use, tell)
+        self._releasing = Releasing(folder, in_use, self._copies.notes, removal, tell)
         self._at = self._waiting  # what the log stands in that is at work
         self._retries = Retries(folder, in_use)
         self._running: MeasuringQueue | None = None
@@ -206,7 +210,7 @@ class Measurings:
                 self._work(recording)
             elif (recording := self._next(self._copies.waiting)) is not None:
                 self._copy(recording)
-            else:
+            elif not self._release():
                 waiting = self._waiting.ids or self._names.ids or self._copies.waiting.ids
                 self._bell.wait(_LOOK_S if waiting else _WATCH_S)
                 self._bell.clear()
@@ -268,6 +272,13 @@ class Measurings:
             self.renamed(recording, log)
             self._copies.want(recording)
 
+    def _release(self) -> bool:
+        """Release a recording that is safe on the other disk, if there is one to be released."""
+        log = None if self._busy() else self._releasing.next()
+        if log is not None:
+            self._releasing.release(log, self._busy, self._is_idle)
+        return log is not None
+
     def _copy(self, recording: str) -> None:
         log, offload = self._log(recording), self._in_use().offload
         with self._at_work(recording, self._copies.waiting):
@@ -289,9 +300,13 @@ class Measurings:
                 self._running = None
 
     def _wanted(self, recording: str) -> bool:
-        if self._at is self._copies.waiting and self._next(self._waiting) is not None:
+        if self._at is self._copies.waiting and not self._is_idle():
             return False  # people wait for a jump: the copy goes on behind it
         return recording in self._at and not self._closed.is_set()
+
+    def _is_idle(self) -> bool:
+        """Whether nothing is to be measured, and the service goes on."""
+        return self._next(self._waiting) is None and not self._closed.is_set()
 
     def _hold(self, held: bool) -> None:
         self._change(paused=held)

@@ -14,10 +14,9 @@ from rig.background.program import Teller, serve
 from rig.errors import StorageError
 from rig.host.disk import ask_free_bytes, replace_file, sync
 from rig.phrase import phrase
-from service.offloading.verified_copy import checksum, copy_file
+from service.offloading.verified_copy import checksum, copy_file, sum_of
 
 _LOG: Final = ".mcap"
-_SUM: Final = ".sha256"
 
 
 def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
@@ -85,7 +84,7 @@ def _confirm(source: Path, target: Path, told: Callable[[int], None]) -> None:
 
 
 def _keep_sum(target: Path, digest: str) -> None:
-    replace_file(_sum_of(target), f"{digest}  {target.name}\n".encode(), links=False)
+    replace_file(sum_of(target), f"{digest}  {target.name}\n".encode(), links=False)
 
 
 def _is_copied(source: Path, target: Path) -> bool:
@@ -98,7 +97,7 @@ def _is_copied(source: Path, target: Path) -> bool:
         return False
     if source.stat().st_size != target.stat().st_size:
         raise _another(target)
-    return _sum_of(target).exists()
+    return sum_of(target).exists()
 
 
 def _another(target: Path) -> StorageError:
@@ -108,10 +107,6 @@ def _another(target: Path) -> StorageError:
 
 def _part(source: Path, to: Path) -> Path:
     return to / f".{source.name}.part"
-
-
-def _sum_of(target: Path) -> Path:
-    return target.with_name(target.name + _SUM)
 
 
 def _files(source: Path) -> list[Path]:

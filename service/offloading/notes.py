@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from recorder.catalogue.trash import beside
 from rig.api.fields import Model
+from rig.api.statement import Level as StatementLevel
 from rig.api.statement import Statement
 from rig.events import Event, Level
 from rig.host.disk import replace_file
@@ -85,6 +86,11 @@ class CopyNotes:
 
     def _warn(self, said: Phrase) -> None:
         self._tell(Event.now(Level.WARNING, "service", said))
+
+
+def as_warning(why: Phrase) -> Statement:
+    """Why something with a recording failed, as its page shows it."""
+    return Statement(level=StatementLevel.WARNING, code=why.code, text=why.text, values=why.values)
 
 
 def mark_of(log: Path) -> str:

@@ -10,6 +10,7 @@ from rig.errors import StorageError
 from rig.host.files import open_to_read
 
 _PIECE: Final = 1 << 22
+_SUM: Final = ".sha256"
 #: Bytes that wait in memory for the other disk: few, so that memory and disks stay free for a recording.
 _SYNC: Final = 1 << 26
 
@@ -56,6 +57,11 @@ def copy_file(source: Path, part: Path, told: Callable[[int], None]) -> str:
             f"{part.parent}: what was read back of {source.name} is not what was written; take another disk"
         )
     return wanted
+
+
+def sum_of(copy: Path) -> Path:
+    """The file with the checksum of a copied log, beside it."""
+    return copy.with_name(copy.name + _SUM)
 
 
 def checksum(path: Path, told: Callable[[int], None]) -> str:

@@ -41,9 +41,11 @@ from service.jumpers.book import JumperBook
 from service.jumpers.keeper import Keeper
 from service.lights import Lights
 from service.measuring.queue import Measurings
+from service.offloading.releasing import Removal
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.measured_jumps import MeasuredJumps
+from service.recordings.steady_clock import SteadyClock
 from service.recordings.storage import usable_bytes
 from service.recordings.trash_keeper import TrashKeeper
 from service.regions import Regions
@@ -134,7 +136,8 @@ def serve(settings: ServiceSettings) -> None:
         trains = Trains(supervisor, settings.rig, preroll_s)
         balls = BallPlaces(lambda: supervisor.rig, data)
         service = Service(
-            supervisor, jumpers, catalogue, exports, stack.enter_context(_measurings(data, supervisor, jumps)), jumps,
+            supervisor, jumpers, catalogue, exports,
+            stack.enter_context(_measurings(data, supervisor, jumps, catalogue)), jumps,
             keeper, slot, rehearser, lights, trains, balls,
             stack.enter_context(closing(_calibrating(settings.rig, data, supervisor, slot))),
             PanelDoctor(lambda: supervisor.rig, data).report,
@@ -203,7 +206,7 @@ def _calibrating(rig_file: Path, data: Path, supervisor: Supervisor, slot: Previ
     return CalibrationHelper(data, lambda: supervisor.rig, slot.fd, supervisor.recordings.runs, keep)
 
 
-def _measurings(data: Path, supervisor: Supervisor, jumps: MeasuredJumps) -> Measurings:
+def _measurings(data: Path, supervisor: Supervisor, jumps: MeasuredJumps, catalogue: Catalogue) -> Measurings:
     """Measures the logs of the recordings, and stands still while a recording runs."""
 
     def found(jumps: tuple[LastJump, ...]) -> None:
@@ -211,8 +214,9 @@ def _measurings(data: Path, supervisor: Supervisor, jumps: MeasuredJumps) -> Mea
             supervisor.commands.ask(at_once(partial(supervisor.board.know_jumps, jumps)), _SOON_S)
 
     earlier, hub = jumps.others_of_athlete, supervisor.hub
+    removal = Removal(catalogue.delete, lambda: catalogue.trash().bytes, SteadyClock().trusted)
     busy = supervisor.recordings.runs
-    made = Measurings(data, lambda: supervisor.rig, busy, earlier, hub.tell, found, hub.wake)
+    made = Measurings(data, lambda: supervisor.rig, busy, earlier, hub.tell, found, hub.wake, removal)
     supervisor.recordings.on_log = made.opened
     return made
 

@@ -23,6 +23,8 @@ _ENDINGS: Final = {
     "_mb": "MB",
     "_gb": "GB",
     "_db": "dB",
+    "_GB": "GB",
+    "_days": "days",
     "_hours": "h",
     "_speed": "Mbit/s",
 }

@@ -56,6 +56,7 @@ from rig.settings.region import RegionLimits
 from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.measuring.queue import Measurings
+from service.offloading.releasing import Removal
 from service.recordings.archive import Archive
 from service.recordings.describing import as_recording
 from service.recordings.measured_jumps import MeasuredJumps
@@ -108,8 +109,9 @@ class MemoryService(Archive):
         self.settings = SIM
         jumps = MeasuredJumps(self.catalogue)
         self.measurings = Measurings(
-            folder, lambda: self.settings, self._busy, jumps.others_of_athlete, lambda _: None, self._found, self._wake
-        )
+            folder, lambda: self.settings, self._busy, jumps.others_of_athlete, lambda _: None, self._found, self._wake,
+            Removal(self.catalogue.delete, lambda: self.catalogue.trash().bytes, lambda: True),
+        )  # fmt: skip
         super().__init__(self.catalogue, Exports(folder, self._busy, lambda: 1e12), self.measurings, jumps)
         self.state = State.IDLE
         self.survey: Path | None = None

@@ -25,6 +25,7 @@ from rig.events import Event
 from rig.settings.model import AnalysisSettings, OffloadSettings
 from service.measuring.queue import Measurings
 from service.measuring.waiting import NAME
+from service.offloading.releasing import Removal
 from service.recordings import live_results
 from service.recordings.measured_jumps import MeasuredJumps
 from tests.analysis.simulated import training
@@ -53,6 +54,7 @@ class Bench:
         survey: what the rig file names; None: it has no `[analysis]`.
         further: what else stands under `[analysis]`.
         copied_to: folder that `[offload]` names; None: there is no such table.
+        keep_free_GB: its rule.
         found: recordings whose jumps were told.
         shown: what was known of each of them then.
         said: the events.
@@ -63,19 +65,22 @@ class Bench:
         self.folder, self.busy, self.survey = folder, False, survey
         self.further: dict[str, Any] = {}
         self.copied_to: Path | None = None
+        self.keep_free_GB: float | None = None
         self.found: list[str] = []
         self.shown: list[Measurement] = []
         self.said: list[str] = []
+        catalogue = Catalogue(folder)
+        self.removal = Removal(catalogue.delete, lambda: catalogue.trash().bytes, lambda: True)
         self.earlier: Callable[[str], list[Path]] = MeasuredJumps(Catalogue(folder)).others_of_athlete
 
     @contextmanager
     def running(self) -> Iterator[Measurings]:
         """A service that measures."""
         analysis = self.survey and AnalysisSettings(survey=self.survey, **self.further)
-        offload = self.copied_to and OffloadSettings(to=self.copied_to)
+        offload = self.copied_to and OffloadSettings(to=self.copied_to, keep_free_GB=self.keep_free_GB)
         rig = SIM.model_copy(update={"analysis": analysis, "offload": offload})
         with Measurings(
-            self.folder, lambda: rig, lambda: self.busy, self.earlier, self._hear, self._know, lambda: None
+            self.folder, lambda: rig, lambda: self.busy, self.earlier, self._hear, self._know, lambda: None, self.removal
         ) as self._queue:
             yield self._queue
 
@@ -343,6 +348,17 @@ def test_recordings_are_copied_where_nothing_is_measured_and_again_when_they_cha
         wait_until((other / "jump.session.json").exists, "the correction is copied", PATIENCE_S)
         wait_until(lambda: state() == [("copy", "done")], "it is noted", PATIENCE_S)
     assert (other / "jump.mcap").stat() == written
+
+
+def test_a_copied_recording_is_released_where_a_rule_says_so(bench: Bench, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    bench.copied_to, bench.survey, bench.keep_free_GB = other, None, 1e6
+    frames = bench.log("jump").read_bytes()
+    with bench.running():
+        wait_until((bench.folder / ".trash" / "jump.mcap").exists, "it is copied and released", PATIENCE_S)
+    assert not bench.log("jump").exists()
+    assert (other / "jump.mcap").read_bytes() == frames
 
 
 def test_nothing_is_done_by_itself_where_nobody_wants_it(bench: Bench) -> None:

@@ -91,6 +91,8 @@ export const events = {
   event_measured_again: ["innmåling eller kamerastillinger er endret: {count} opptak som ikke kunne måles med dem, måles på nytt"],
   event_no_video: ["{recording} har ingen video: {why}"],
   event_no_queue: ["{file}: kan ikke leses, så logger som ventet på å bli målt, er glemt ({why})"],
+  event_released: ["{recording} er frigitt: det ligger i {folder}, og her i papirkurven"],
+  event_not_released: ["{recording} er ikke frigitt: {why}"],
   event_copies_unknown: ["{file}: kan ikke leses ({why}): opptakene kopieres en gang til"],
   event_copies_not_kept: ["{file}: kan ikke skrives ({why}): en tjeneste som starter på nytt, kopierer opptak en gang til"],
   event_queue_not_kept: ["{file}: kan ikke skrives ({why}): en tjeneste som starter på nytt, vet ikke hva den skal måle"],

@@ -1,0 +1,111 @@
+"""Recordings are released only by a rule, and only when their copy is what was recorded."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from recorder.catalogue.folder import Catalogue
+from rig.events import Event
+from rig.settings.model import OffloadSettings
+from service.offloading.copying import _copy
+from service.offloading.notes import CopyNotes, mark_of
+from service.offloading.releasing import Releasing, Removal
+from tests.recorder.logs import write_log
+from tests.support.rigs import SIM
+
+DAY_S = 86400
+
+
+class Bench:
+    """A folder with two recordings, of 40 and of 20 days ago, both copied."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.to = folder / "here", folder / "there"
+        self.to.mkdir(parents=True)
+        self.folder.mkdir()
+        self.said: list[str] = []
+        self.clock_is_right = True
+        self.catalogue = Catalogue(self.folder)
+        self.notes = CopyNotes(self.folder, lambda _: None)
+        for name, days in (("old", 40), ("new", 20)):
+            log = self.log(name)
+            write_log(log)
+            then = time.time() - days * DAY_S
+            os.utime(log, (then, then))
+            mark = mark_of(log)
+            assert _copy({"paths": [str(log)], "to": str(self.to)}, lambda **_: None) == {}  # type: ignore[arg-type]
+            self.notes.note(log, mark, None)
+
+    def log(self, name: str) -> Path:
+        return self.folder / f"{name}.mcap"
+
+    def release(self, **rules: Any) -> list[str]:
+        """Release what the rules let go; returns what is left."""
+        rig = SIM.model_copy(update={"offload": OffloadSettings(to=self.to, **rules)})
+        removal = Removal(self.catalogue.delete, lambda: self.catalogue.trash().bytes, lambda: self.clock_is_right)
+        releasing = Releasing(self.folder, lambda: rig, self.notes, removal, self._hear)
+        while (log := releasing.next()) is not None:
+            releasing.release(log, busy=lambda: False, wanted=lambda: True)
+        return sorted(path.stem for path in self.folder.glob("*.mcap"))
+
+    def _hear(self, event: Event) -> None:
+        self.said.append(event.message)
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
+
+
+def test_without_a_rule_everything_stays(bench: Bench) -> None:
+    assert bench.release() == ["new", "old"]
+    assert not bench.said
+
+
+def test_what_is_older_than_the_rule_goes_into_the_trash(bench: Bench) -> None:
+    bench.clock_is_right = False
+    assert bench.release(keep_days=30) == ["new", "old"]
+    bench.clock_is_right = True
+    assert bench.release(keep_days=30) == ["new"]
+    assert bench.said == [f"old is released: it lies in {bench.to}, and here in the trash"]
+    assert [entry.id for entry in bench.catalogue.entries(deleted=True)] == ["old"]
+    assert (bench.to / "old.mcap").exists()
+
+
+def test_room_is_kept_free_by_releasing_the_oldest(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    size = bench.log("old").stat().st_size
+    monkeypatch.setattr("service.offloading.releasing.free_bytes", lambda _: 1_000_000_000)
+    assert bench.release(keep_free_GB=1.0) == ["new", "old"]
+    assert bench.release(keep_free_GB=1.0 + size / 2e9) == ["new"]  # what lies in the trash counts as free
+    assert bench.release(keep_free_GB=100.0) == []
+
+
+def _another_copy(bench: Bench) -> None:
+    copy = bench.to / "old.mcap"
+    data = bytearray(copy.read_bytes())
+    data[-100] ^= 1
+    copy.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("harm", "said"),
+    [
+        (_another_copy, "old is not released: "),
+        (lambda bench: (bench.to / "old.mcap").unlink(), ""),
+        (lambda bench: (bench.to / "old.mcap.sha256").unlink(), ""),
+        (lambda bench: bench.to.rename(bench.to.with_name("gone")), ""),
+        (lambda bench: (bench.folder / "old.session.json").write_text('{"athlete": "Kari"}'), ""),
+    ],
+    ids=["another copy", "no copy", "no checksum", "no disk", "changed since"],
+)
+def test_what_is_not_safe_stays(bench: Bench, harm: Callable[[Bench], object], said: str) -> None:
+    harm(bench)
+    assert bench.release(keep_days=30) == ["new", "old"]
+    assert [text[: len(said)] for text in bench.said] == ([said] if said else [])
+    if said:
+        assert not bench.notes.is_copied(bench.log("old"))
+        assert not (bench.to / "old.mcap.sha256").exists()

@@ -1,9 +1,10 @@
 """Codes pixels without loss by FFV1 (RFC 9043), version 1: every image for itself, by nothing but its own bytes."""
 
 from fractions import Fraction
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import av
+import numpy as np
 
 from rig.images.pixels import Stored
 
@@ -37,8 +38,8 @@ class Encoder:
         return bytes(packets[0])
 
 
-def decoded(coded: bytes, shape: tuple[int, int], size: int) -> bytes:
-    """The pixels of an image, rows without gaps.
+def decoded(coded: bytes, shape: tuple[int, int], size: int) -> Stored:
+    """The pixels of an image, (rows, columns), where the decoder has put them.
 
     Args:
         coded: what the encoder made of it.
@@ -54,7 +55,10 @@ def decoded(coded: bytes, shape: tuple[int, int], size: int) -> bytes:
         raise ValueError(f"it is no FFV1 image ({error.strerror})") from None
     if len(frames) != 1 or frames[0].format.name != _FORMATS[size] or (frames[0].height, frames[0].width) != shape:
         raise ValueError("its FFV1 image is of another size or kind")
-    return frames[0].to_ndarray().tobytes()
+    plane = frames[0].planes[0]
+    kind: np.dtype[np.unsignedinteger[Any]] = np.dtype(np.uint8 if size == 1 else "<u2")
+    rows = np.frombuffer(memoryview(plane), kind).reshape(shape[0], plane.line_size // size)
+    return rows[:, : shape[1]]
 
 
 def _context(mode: Literal["r", "w"], shape: tuple[int, int]) -> av.VideoCodecContext:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
 from isal.isal_zlib import crc32
 
 from recorder.log.coded_image import CodedImage
@@ -57,10 +58,14 @@ def records_crc(messages: Iterable[Message]) -> int:
     return crc
 
 
-def _recorded(coded: CodedImage) -> bytes:
+def _recorded(coded: CodedImage) -> bytearray:
     from recorder.log.ffv1 import CODEC, decoded  # noqa: PLC0415 - who reads no compacted log needs no decoder
 
     if coded.codec != CODEC:
         raise ValueError("this version does not know its codec")
     pixels = decoded(bytes(coded.coded), coded.shape, coded.kind.size)
-    return b"".join((coded.head, pixels_field(coded.shape, coded.kind), pixels))
+    before = coded.head + pixels_field(coded.shape, coded.kind)
+    message = bytearray(len(before) + pixels.nbytes)  # a large image is there twice, not more often
+    message[: len(before)] = before
+    np.frombuffer(message, pixels.dtype, offset=len(before)).reshape(pixels.shape)[:] = pixels
+    return message

@@ -7,16 +7,30 @@ import random
 import struct
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, ChunkIndex, DataEnd, Footer, Header, Metadata, Statistics
 
-from recorder.log.mcap_layout import EVENTS_CHANNEL, HEALTH_CHANNEL, MAGIC, TAG_CHANNEL, TRIPLET_CHANNEL, records
+from recorder.log.coded_image import CodedImage
+from recorder.log.ffv1 import CODEC, Encoder
+from recorder.log.mcap_layout import (
+    EVENTS_CHANNEL,
+    HEALTH_CHANNEL,
+    MAGIC,
+    TAG_CHANNEL,
+    TRIPLET_CHANNEL,
+    pixels_field,
+    raw_image_prefix,
+    records,
+)
 from recorder.log.session_changes import session_path
+from rig.images.pixels import MONO8, Pixels
 from tests.recorder.hostile.builder import Builder, chunk, event, image, message, record, text
-from tests.recorder.logs import ALL_OK, START, make_tag, write_log
+from tests.recorder.logs import ALL_OK, SHAPE, START, make_tag, write_log
 
 _DEEP: Final = 30_000
 _ESCAPE: Final = "\x1b]0;owned\x07\x1b[31m\r\nK1\n\t\u202e"
@@ -98,6 +112,11 @@ def _tags() -> Iterator[tuple[str, Builder]]:
     yield "all-tags-too-long-to-be-written", long_tags
 
 
+def _head(shape: tuple[int, int], kind: Pixels = MONO8) -> bytes:
+    """The fields before the pixels of an image."""
+    return raw_image_prefix(shape, make_tag(2).time, kind).removesuffix(pixels_field(shape, kind))
+
+
 def _images() -> Iterator[tuple[str, Builder]]:
     """Images that no recorder writes."""
     changes: dict[str, dict[str, object]] = {
@@ -115,6 +134,19 @@ def _images() -> Iterator[tuple[str, Builder]]:
         "endless-time": b"\x0a\x0a\x08" + b"\xff" * 8 + b"\x7f" + image(2), "tag-zero": b"\x02\x00" * 50,
     }.items():  # fmt: skip
         yield f"image-{name}", Builder().picture(data)
+    black = np.zeros(SHAPE, np.uint8)
+    sound = CodedImage(_head(SHAPE), CODEC, 0, Encoder(SHAPE, 1)(black))
+    for name, coded in {
+        "other-checksum": sound, "other-codec": replace(sound, codec="h264"), "no-pixels": replace(sound, coded=b""),
+        "garbage": replace(sound, coded=bytes(range(256)) * 4), "no-head": replace(sound, head=b""),
+        "other-kind": replace(sound, head=_head(SHAPE, Pixels("mono16", 12))),
+        "large": replace(sound, head=_head((16_000, 16_000))),
+        "huge": replace(sound, head=_head((4_000_000_000, 4_000_000_000))),
+    }.items():  # fmt: skip
+        yield f"coded-{name}", Builder().picture(coded.encode())
+    data = sound.encode()
+    yield "coded-cut", Builder().picture(data[: len(data) // 2])
+    yield "coded-twice", Builder().picture(data + data)
     yield "image-alone", Builder().pulse(1).add(chunk(message(TRIPLET_CHANNEL, 2, image(2))))
     yield (
         "image-twice",

@@ -35,6 +35,7 @@ def _commands(log: Path, out: Path) -> dict[str, Callable[[], int]]:
         "verify --json": lambda: main(["verify", str(log), "--json"]),
         "recover": lambda: main(["recover", str(log), "-o", str(new)]),
         "verify recovered": lambda: main(["verify", str(new)]) if new.exists() else 0,
+        "compact": lambda: main(["compact", str(log), "-o", str(out / "compact.mcap")]),
         "replay": lambda: main(["replay", str(log), "--speed", "max", "--wait", "0", "--bind", address]),
         "catalogue": lambda: _catalogue(log),
     }

@@ -76,13 +76,24 @@ class Bench:
     @contextmanager
     def running(self) -> Iterator[Measurings]:
         """A service that measures."""
+        with self.queue() as self._queue:
+            yield self._queue
+
+    def queue(self) -> Measurings:
+        """Its queue, not yet at work."""
         analysis = self.survey and AnalysisSettings(survey=self.survey, **self.further)
         offload = self.copied_to and OffloadSettings(to=self.copied_to, keep_free_GB=self.keep_free_GB)
         rig = SIM.model_copy(update={"analysis": analysis, "offload": offload})
-        with Measurings(
-            self.folder, lambda: rig, lambda: self.busy, self.earlier, self._hear, self._know, lambda: None, self.removal
-        ) as self._queue:
-            yield self._queue
+        return Measurings(
+            self.folder,
+            lambda: rig,
+            lambda: self.busy,
+            self.earlier,
+            self._hear,
+            self._know,
+            lambda: None,
+            self.removal,
+        )
 
     def log(self, recording: str) -> Path:
         """The log of a recording."""
@@ -348,6 +359,18 @@ def test_recordings_are_copied_where_nothing_is_measured_and_again_when_they_cha
         wait_until((other / "jump.session.json").exists, "the correction is copied", PATIENCE_S)
         wait_until(lambda: state() == [("copy", "done")], "it is noted", PATIENCE_S)
     assert (other / "jump.mcap").stat() == written
+
+
+def test_a_copy_gives_way_to_a_log_that_waits_to_be_measured(bench: Bench, tmp_path: Path) -> None:
+    bench.copied_to = tmp_path
+    queue = bench.queue()
+    queue._copies.want("old")
+    with queue._at_work("old", queue._copies.waiting):
+        assert queue._wanted("old")
+        queue.want("jump", bench.log("jump"))
+        assert not queue._wanted("old")
+        bench.busy = True  # then it only stands still
+        assert queue._wanted("old")
 
 
 def test_a_copied_recording_is_released_where_a_rule_says_so(bench: Bench, tmp_path: Path) -> None:

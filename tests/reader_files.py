@@ -1,7 +1,6 @@
 """What a reader of the pages has in his folder beside a recording: films, targets, results, files of other programs."""
 
 import json
-import os
 import re
 import shutil
 from collections.abc import Callable
@@ -99,12 +98,9 @@ def write_results(folder: Path) -> None:
 
 
 def write_season(folder: Path) -> None:
-    """A campaign of a log and of sixty that are measured already."""
+    """A campaign of sixty logs that are measured already."""
     season = draw_season(folder, jumps=60, athletes=5, days=5)
-    (folder / "granasen").mkdir()
-    os.link(folder / "jump.mcap", folder / "granasen" / "2026-11-21T19-40-18Z.mcap")
-    more = '[[hills]]\nname = "Granåsen"\nlogs = ["granasen"]\nsurvey = "survey.json"\n[cluster]\nworkers = 1\n'
-    season.file.write_text(season.file.read_text() + more)
+    season.file.write_text(season.file.read_text() + "[cluster]\nworkers = 1\n")
 
 
 def write_firewire_rig(folder: Path) -> None:

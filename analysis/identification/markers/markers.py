@@ -11,7 +11,7 @@ import numpy as np
 from analysis.candidates.model import SecondLook, Spots
 from analysis.identification.markers.left_right import name_bindings
 from analysis.identification.markers.naming import name_points
-from analysis.identification.over_time.assignment import DETECTED, Assigned, assign, well_known
+from analysis.identification.over_time.assignment import Assigned, assign, well_known
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Part, PathFilter, Prediction, predict
 from analysis.identification.over_time.window import Window
@@ -241,8 +241,6 @@ def _rather_left(views: Views, window: Window, flight: Flight, t: int, named: In
     points, at = window.points[t], int(named[BINDINGS].max())
     place, body = points.xyz[at], np.mean([points.xyz[i] for i in named[: _HIP + 1] if i >= 0], axis=0)
     aside = float((place - body) @ flight.axes[1])
-    found = DETECTED * shown(views, place, flight.axes[1])[BINDINGS]
-    inside = np.array([bool(views.inside(k, place[None])[0]) for k in range(len(views))]) & window.delivered[t]
-    chance = np.where(points.rays[at] >= 0, found, np.where(inside, 1 - found, 1.0))
+    chance = shown(views, place, flight.axes[1])[BINDINGS][:, points.rays[at] >= 0]
     right, left = np.log(chance).sum(axis=1)
     return float(2 * _HALF_GAP_M * aside / _ASIDE_M**2 + left - right)

@@ -77,9 +77,8 @@ def name_points(views: Views, window: Window, flight: Flight) -> Integers:
 def _worths(views: Views, rays: Sequence[Rays], delivered: Flags, points: SpacePoints, of_sides: Floats) -> Floats:
     """Cost (4, n) of each point being each marker against chance; of_sides (4, m), see `shown`."""
     sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
-    found = DETECTED * of_sides
-    rate = 2 * np.log(2 * np.pi / found * (1 + np.array([len(r.xy) for r in rays])) / sizes)
-    rate = rate + np.where(delivered, 2 * np.log(1 - found), 0.0)
+    rate = 2 * np.log(2 * np.pi / (DETECTED * of_sides) * (1 + np.array([len(r.xy) for r in rays])) / sizes)
+    rate = rate + np.where(delivered, 2 * np.log(1 - DETECTED), 0.0)
     cost = points.misfit + np.linalg.slogdet(points.covariance + _BODY_M**2 * np.eye(3))[1]
     cost = np.tile(cost - np.linalg.slogdet(points.covariance)[1], (len(POINTS), 1))
     for k, of_camera in enumerate(rays):

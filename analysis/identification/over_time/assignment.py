@@ -135,13 +135,13 @@ def _options(
     counts = np.array([[len(of.xy) for of in of_camera] for of_camera in rays])
     sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
     xyz, covariance, known = predicted.xyz[steps], predicted.covariance[steps], known[steps]
-    found_share = DETECTED * np.stack([shown(views, xyz[:, i], left)[:, i] for i in range(xyz.shape[1])], axis=1)
-    rate = 2 * np.log(2 * np.pi / found_share * (1 + counts.T[:, None]) / sizes)
+    in_sight = np.stack([shown(views, xyz[:, i], left)[:, i] for i in range(xyz.shape[1])], axis=1)
+    rate = 2 * np.log(2 * np.pi / (DETECTED * in_sight) * (1 + counts.T[:, None]) / sizes)
     sights = views.see_all(xyz.reshape(-1, 3))
     inside = np.stack([sight.inside.reshape(known.shape) for sight in sights], axis=2)
     expected = known[..., None] & window.delivered[steps][:, None] & inside
     # (t, n, m) cost of a ray by chance and by not being missed
-    cost = rate + np.where(expected, 2 * np.log(1 - found_share), 0.0)
+    cost = rate + np.where(expected, 2 * np.log(1 - DETECTED), 0.0)
     points = [window.points[t] for t in steps]
     for t, i, option in _points(rays, points, xyz, covariance, known, cost):
         found.setdefault((int(steps[t]), i), []).append(option)

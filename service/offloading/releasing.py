@@ -123,10 +123,13 @@ class Releasing:
 
     def _is_safe(self, log: Path, copy: Path) -> bool:
         try:
-            same = copy.stat().st_size == log.stat().st_size and sum_of(copy).exists()
+            here, there = log.stat(), copy.stat()
+            # a disk that is not mounted leaves an empty folder on the first one
+            other_disk = there.st_dev != here.st_dev
+            same = there.st_size == here.st_size and sum_of(copy).exists()
         except OSError:
             return False
-        return same and self._notes.is_copied(log)
+        return other_disk and same and self._notes.is_copied(log)
 
     def _kept(self, log: Path, why: Phrase) -> None:
         """Say why a recording stays, and let it be copied again."""

@@ -86,37 +86,43 @@ def look_at_room(rig: RigSettings, directory: Path, free: int) -> Finding:
     return judged(level, Topic.DISK, said, remedy)
 
 
-def look_at_fallback(rig: RigSettings, directory: Path) -> Iterator[Finding]:
-    """Can the folder be written in which a recording goes on when its disk fails, and is it on another disk?"""
-    fallback = rig.recorder.fallback_directory
-    if fallback is None:
-        return
-    place = existing_part(fallback)
+def look_at_other_disks(rig: RigSettings, directory: Path) -> Iterator[Finding]:
+    """Can the folders be written in which a recording goes on, or is copied, and are they on other disks?"""
+    if rig.recorder.fallback_directory is not None:
+        yield from _look_at_other_disk(rig.recorder.fallback_directory, "recorder.fallback_directory", directory)
+    if rig.offload is not None:
+        yield from _look_at_other_disk(rig.offload.to, "offload.to", directory)
+
+
+def _look_at_other_disk(folder: Path, setting: str, directory: Path) -> Iterator[Finding]:
+    place = existing_part(folder)
     try:
         with _unnamed_file(place) as fd:
             free = free_bytes(fd) or 0
     except OSError as error:
         yield failure(
             Topic.DISK,
-            "check_fallback_not_writable",
-            "{folder} (recorder.fallback_directory) cannot be written: {why}",
+            "check_other_disk_not_writable",
+            "{folder} ({setting}) cannot be written: {why}",
             "correct its permissions; under systemd allow it: sudo systemctl edit svev, [Service] ReadWritePaths=",
-            folder=str(fallback),
+            folder=str(folder),
+            setting=setting,
             why=error.strerror or str(error),
         )
         return
     if place.stat().st_dev == existing_part(directory).stat().st_dev:
         yield warning(
             Topic.DISK,
-            "check_fallback_same_disk",
-            "{folder} (recorder.fallback_directory) is on the same disk as {first}",
+            "check_other_disk_same",
+            "{folder} ({setting}) is on the same disk as {first}",
             "choose a folder on another disk, and check that this one is mounted",
-            folder=str(fallback),
+            folder=str(folder),
+            setting=setting,
             first=str(directory),
         )
     else:
-        what = "{gb:.1f} GB free in {folder}, if the first disk fails"
-        yield passed(Topic.DISK, "check_fallback", what, gb=free / _GB, folder=str(fallback))
+        what = "{gb:.1f} GB free in {folder} ({setting})"
+        yield passed(Topic.DISK, "check_other_disk", what, gb=free / _GB, folder=str(folder), setting=setting)
 
 
 def judge_trial(rig: RigSettings, directory: Path, trial: Trial) -> Iterator[Finding]:

@@ -49,7 +49,7 @@ def probes(rig: RigSettings, directory: Path, interrupted: bool | None = None) -
         Probe("shared memory", Topic.MEMORY, lambda: machine.look_at_shared_memory(rig)),
         Probe("huge pages", Topic.MEMORY, machine.look_at_huge_pages),
         Probe("disk", Topic.DISK, lambda: disk.look_at_disk(rig, directory), limit_s=30.0),
-        Probe("second disk", Topic.DISK, lambda: disk.look_at_fallback(rig, directory)),
+        Probe("other disks", Topic.DISK, lambda: disk.look_at_other_disks(rig, directory)),
         Probe("packet sockets", Topic.NETWORK, lambda: network.look_at_packet_sockets(rig)),
         Probe("socket buffers", Topic.NETWORK, lambda: network.look_at_socket_buffers(rig)),
         Probe("interfaces", Topic.NETWORK, lambda: network.look_at_interfaces(rig)),

@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import av
@@ -373,15 +374,15 @@ def test_a_copy_gives_way_to_a_log_that_waits_to_be_measured(bench: Bench, tmp_p
         assert queue._wanted("old")
 
 
-def test_a_copied_recording_is_released_where_a_rule_says_so(bench: Bench, tmp_path: Path) -> None:
-    other = tmp_path / "other"
-    other.mkdir()
-    bench.copied_to, bench.survey, bench.keep_free_GB = other, None, 1e6
+def test_a_copied_recording_is_released_where_a_rule_says_so(bench: Bench) -> None:
     frames = bench.log("jump").read_bytes()
-    with bench.running():
-        wait_until((bench.folder / ".trash" / "jump.mcap").exists, "it is copied and released", PATIENCE_S)
-    assert not bench.log("jump").exists()
-    assert (other / "jump.mcap").read_bytes() == frames
+    with TemporaryDirectory(dir="/dev/shm", prefix="svev-test-") as folder:
+        other = Path(folder)
+        bench.copied_to, bench.survey, bench.keep_free_GB = other, None, 1e6
+        with bench.running():
+            wait_until((bench.folder / ".trash" / "jump.mcap").exists, "it is copied and released", PATIENCE_S)
+        assert not bench.log("jump").exists()
+        assert (other / "jump.mcap").read_bytes() == frames
 
 
 def test_nothing_is_done_by_itself_where_nobody_wants_it(bench: Bench) -> None:

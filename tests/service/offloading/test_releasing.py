@@ -2,8 +2,9 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -23,9 +24,9 @@ DAY_S = 86400
 class Bench:
     """A folder with two recordings, of 40 and of 20 days ago, both copied."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.to = folder / "here", folder / "there"
-        self.to.mkdir(parents=True)
+    def __init__(self, folder: Path, to: Path) -> None:
+        self.folder, self.to = folder / "here", to / "there"
+        self.to.mkdir()
         self.folder.mkdir()
         self.said: list[str] = []
         self.clock_is_right = True
@@ -57,8 +58,13 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Bench:
-    return Bench(tmp_path)
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with TemporaryDirectory(dir="/dev/shm", prefix="svev-test-") as other_disk:
+        yield Bench(tmp_path, Path(other_disk))
+
+
+def test_a_copy_on_the_same_disk_releases_nothing(tmp_path: Path) -> None:
+    assert Bench(tmp_path, tmp_path).release(keep_days=30) == ["new", "old"]
 
 
 def test_without_a_rule_everything_stays(bench: Bench) -> None:

@@ -2,12 +2,12 @@ import os
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from rig.settings.model import RigSettings
+from rig.settings.model import OffloadSettings, RigSettings
 from svev.doctor import disk
 from svev.doctor.finding import Level
 from tests.support.rigs import SIM
@@ -107,16 +107,23 @@ def _with_fallback(folder: Path) -> RigSettings:
     return SIM.model_copy(update={"recorder": SIM.recorder.model_copy(update={"fallback_directory": folder})})
 
 
+def _with_copies(folder: Path) -> RigSettings:
+    return SIM.model_copy(update={"offload": OffloadSettings(to=folder)})
+
+
+@pytest.mark.parametrize("asked", [_with_fallback, _with_copies])
 @pytest.mark.parametrize(
     ("folder", "level", "word"),
     [
-        (Path("/dev/shm/season"), Level.PASS, "if the first disk fails"),  # noqa: S108 - a file system of its own
+        (Path("/dev/shm/season"), Level.PASS, "GB free in"),  # noqa: S108 - a file system of its own
         (Path("second"), Level.WARN, "on the same disk"),
         (Path("/proc/self/task"), Level.FAIL, "cannot be written"),
     ],
 )
-def test_the_second_disk_is_examined(folder: Path, level: Level, word: str, tmp_path: Path) -> None:
-    (finding,) = disk.look_at_fallback(_with_fallback(tmp_path / folder), tmp_path)
+def test_the_other_disks_are_examined(
+    folder: Path, level: Level, word: str, asked: Callable[[Path], RigSettings], tmp_path: Path
+) -> None:
+    (finding,) = disk.look_at_other_disks(asked(tmp_path / folder), tmp_path)
     assert (finding.level, word in finding.what) == (level, True), finding
     assert list(tmp_path.iterdir()) == []
-    assert list(disk.look_at_fallback(SIM, tmp_path)) == []
+    assert list(disk.look_at_other_disks(SIM, tmp_path)) == []

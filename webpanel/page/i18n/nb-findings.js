@@ -33,9 +33,9 @@ export const findings = {
   check_disk_speed: ["disken skriver {writes} og leser {reads} MB/s, {needed} MB/s trengs", "ta opp på en raskere disk (NVMe), eller senk trigger.rate_hz eller gjør utsnittene mindre"],
   check_disk_forgets: ["{folder} gir ikke tilbake det som ble skrevet", "disken svikter: se i `dmesg`, bytt den"],
   check_no_direct_io: ["filsystemet i {folder} har ikke direkte I/O: opptak koster flere ganger så mye prosessortid", "ta opp på ext4 eller xfs på en lokal disk"],
-  check_fallback: ["{gb} GB ledig i {folder} hvis den første disken svikter"],
-  check_fallback_not_writable: ["det kan ikke skrives i {folder} (recorder.fallback_directory): {why}", "rett tilgangen; under systemd tillates det med: sudo systemctl edit svev, [Service] ReadWritePaths="],
-  check_fallback_same_disk: ["{folder} (recorder.fallback_directory) er på samme disk som {first}", "velg en mappe på en annen disk, og sjekk at den er montert"],
+  check_other_disk: ["{gb} GB ledig i {folder} ({setting})"],
+  check_other_disk_not_writable: ["det kan ikke skrives i {folder} ({setting}): {why}", "rett tilgangen; under systemd tillates det med: sudo systemctl edit svev, [Service] ReadWritePaths="],
+  check_other_disk_same: ["{folder} ({setting}) er på samme disk som {first}", "velg en mappe på en annen disk, og sjekk at den er montert"],
 
   check_gpio: ["linje {line} på {chip} er på plass ({setting})"],
   check_barrier: ["linje {line} på {chip} er klar for lysporten: Sjekk på siden viser nivået"],

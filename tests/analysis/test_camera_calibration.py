@@ -145,7 +145,7 @@ def test_a_file_that_is_no_good_is_named_with_the_remedy(tmp_path: Path) -> None
     assert "not valid JSON" in _complaint(tmp_path / "torn.json")
     network = tmp_path / "network.json"
     network.write_text('{"format": "svev-network/1", "cameras": {}}')
-    assert "format" in _complaint(network)
+    assert "is a network or survey, and a result of svev calibrate, orient or adjust is wanted" in _complaint(network)
     failed = _write(tmp_path, REAL, REAL, converged=False)
     assert _complaint(failed) == "this calibration has no result; calibrate again or name another file"
 

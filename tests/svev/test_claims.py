@@ -32,7 +32,7 @@ def test_a_directory_has_one_program_that_records(tmp_path: Path) -> None:
     with serve_claim(data):
         pass
     (tmp_path / "file").touch()
-    with pytest.raises(BadInputError, match="cannot be written"), record_claim(tmp_path / "file"):
+    with pytest.raises(BadInputError, match="is no folder"), record_claim(tmp_path / "file"):
         pass
 
 

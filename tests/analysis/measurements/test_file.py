@@ -90,7 +90,7 @@ WRONG = {
     ("format",): ("svev-network/1", r'key "format" = .*svev-measurements/1'),
     ("rate_hz",): (0, r'key "rate_hz" = 0: .*; correct it'),
     ("rate",): (30, r'unknown key "rate"; did you mean "rate_hz"\?'),
-    ("cameras", "K1", "size"): ([640], r'"cameras.K1.size" = .*at least 2'),
+    ("cameras", "K1", "size"): ([640], r'"cameras.K1.size" = .*2 at least'),
     ("cameras", "K1"): (
         {"size": [64, 48]},
         r"pulse 94, K1: P1 is at \(312.4, 201.7\), outside of its image of 64 x 48",
@@ -108,7 +108,7 @@ WRONG = {
         "automatic",
         r'P1": an auto.* no "sigma"; add',
     ),
-    ("jumps", 0, "pulses", 0, "images", "K1", "skis", "right", "xy"): ([[1, 2]], r"right.xy.*at least 2 items"),
+    ("jumps", 0, "pulses", 0, "images", "K1", "skis", "right", "xy"): ([[1, 2]], r"right.xy.*2 at least"),
     ("jumps", 0, "pulses", 0, "images", "K1", "skis", "right", "sigma"): ([1, 1, 1], r"3 numbers; give one, or 2: one"),
 }
 

@@ -7,7 +7,6 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import av
@@ -32,6 +31,7 @@ from service.recordings.measured_jumps import MeasuredJumps
 from tests.analysis.simulated import training
 from tests.recorder.logs import write_log
 from tests.support.kept import kept_hill_log
+from tests.support.other_disk import other_disk
 from tests.support.rigs import SIM
 from tests.support.waiting import wait_until
 
@@ -376,8 +376,7 @@ def test_a_copy_gives_way_to_a_log_that_waits_to_be_measured(bench: Bench, tmp_p
 
 def test_a_copied_recording_is_released_where_a_rule_says_so(bench: Bench) -> None:
     frames = bench.log("jump").read_bytes()
-    with TemporaryDirectory(dir="/dev/shm", prefix="svev-test-") as folder:
-        other = Path(folder)
+    with other_disk() as other:
         bench.copied_to, bench.survey, bench.keep_free_GB = other, None, 1e6
         with bench.running():
             wait_until((bench.folder / ".trash" / "jump.mcap").exists, "it is copied and released", PATIENCE_S)

@@ -4,7 +4,6 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -16,6 +15,7 @@ from service.offloading.copying import _copy
 from service.offloading.notes import CopyNotes, mark_of
 from service.offloading.releasing import Releasing, Removal
 from tests.recorder.logs import write_log
+from tests.support.other_disk import other_disk
 from tests.support.rigs import SIM
 
 DAY_S = 86400
@@ -59,8 +59,8 @@ class Bench:
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:
-    with TemporaryDirectory(dir="/dev/shm", prefix="svev-test-") as other_disk:
-        yield Bench(tmp_path, Path(other_disk))
+    with other_disk() as other:
+        yield Bench(tmp_path, other)
 
 
 def test_a_copy_on_the_same_disk_releases_nothing(tmp_path: Path) -> None:

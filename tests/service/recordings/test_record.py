@@ -347,12 +347,12 @@ def test_a_camera_that_is_not_there_is_named(tmp_path: Path, loopback: Loopback,
     fault_table.tell("Cameras and pulses", "no camera answers at the start", lost="all", said=said, code=code)
 
 
-def test_an_unwritable_directory_is_named(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
+def test_a_file_in_place_of_the_folder_is_named(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
     (tmp_path / "file").touch()
     code, _, err = _result(_record(write_rig(tmp_path, "sim", loopback), tmp_path / "file" / "logs", 1))
     assert (code, len(err.strip().splitlines())) == (2, 1)
-    assert "cannot be written" in err
-    fault_table.tell("The disk", "the folder cannot be written", lost="all", said=err, code=code)
+    assert "is no folder; choose another --out" in err
+    fault_table.tell("The disk", "a file stands where the folder should be", lost="all", said=err, code=code)
 
 
 def test_a_recording_that_does_not_fit_is_refused(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:

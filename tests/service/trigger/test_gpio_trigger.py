@@ -98,7 +98,12 @@ def test_each_pulse_of_the_line_is_in_the_log_at_its_time_also_those_that_no_cam
     known_to = 5e6 + 1000 * max(word.uncertainty_us for word in told)
     assert max(abs(rises[n] + to_utc - int(tag["time_ns"])) for n, tag in zip(pulses, tags, strict=True)) < known_to
     fates = Counter(tuple(camera["status"] for camera in tag["cameras"]) for tag in tags)
-    assert set(fates) == {("ok", "ok"), ("missed", "missed"), ("ok", "missed")}, fates
+    # A crowded machine may lose a packet, and says so: the frame is damaged.
+    assert {fate for fate in fates if "damaged" not in fate} == {
+        ("ok", "ok"),
+        ("missed", "missed"),
+        ("ok", "missed"),
+    }, fates
     assert 0 < fates["missed", "missed"] / len(tags) < 0.5  # a busy computer leaves some of the pulses out
     assert source.unfired == 0
     assert source.unseen > 0

@@ -32,7 +32,7 @@ from rig.phrase import escaped
 from rig.topics import COMPACT_METADATA, TAG, TRIPLET
 from triggering.ledger.account import Ledger
 
-_MAKE_WHOLE: Final = "make a whole log of it with `svev recover`, and compact that one"
+_MAKE_WHOLE: Final = "make a whole log of it with svev recover, and compact that one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,5 +248,5 @@ class _Writing:
     def _foreign(self, offset: int) -> BadInputError:
         return BadInputError(
             f"{self._reader.path}: holds what no recorder of svev writes, at byte {offset}: write it anew with "
-            "`svev recover`, and compact that one"
+            "svev recover, and compact that one"
         )

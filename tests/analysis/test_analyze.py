@@ -48,7 +48,7 @@ def test_a_jump_is_measured_and_its_errors_are_within_their_sigmas(
     assert abs(measured["takeoff"]["pulse"] - (30.0 - PULSES[0] + 1)) < 4 * measured["takeoff"]["sigma_pulses"] + 0.05
     _points_are_true(measured, jump.truth)
     _angles_are_true(measured, jump.truth)
-    names = {"jumper.csv", "jumper.c3d", "jumper.trc", "report.html", "protocol.html", "protocol.txt"}
+    names = {"jumper.csv", "jumper.c3d", "jumper.trc", "jumper.osim", "report.html", "protocol.html", "protocol.txt"}
     names |= {"jumper.json", "network.json", "measurements.json", "overlay.json", "cameras.json"}
     names |= {"kinogram.html", "kinogram.jpg", "kinogram.json"}
     assert {Path(file).name for file in summary["files"]} == names

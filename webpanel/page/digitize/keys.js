@@ -100,11 +100,17 @@ function escape() {
   change({ tape: null, hover: null, guess: false, dragged: null });
 }
 
-/** Nudge the mark, or move the picture: with Ctrl, and where nothing is marked. @param {KeyboardEvent} event */
+/**
+ * Nudge the mark, or move the picture: with Ctrl, and where nothing is marked. Nothing before the pulse's marks have come.
+ *
+ * @param {KeyboardEvent} event
+ */
 function arrow(event) {
   const [x, y] = WAYS[event.key.toLowerCase()];
   const step = event.shiftKey ? LARGE_NUDGE : NUDGE;
-  if (event.ctrlKey || !nudge(x * step, y * step)) pan(x, y);
+  if (event.ctrlKey) return pan(x, y);
+  if (state.operator && !state.view) return;
+  if (!nudge(x * step, y * step)) pan(x, y);
 }
 
 /** @param {KeyboardEvent} event */

@@ -74,6 +74,7 @@ def _place(page: Page, camera: str, thing: str, true: Floats) -> None:
     page.keyboard.press("Enter")
     settled(page)
     _choose(page, camera, thing)
+    expect(page.locator("#mark-words")).to_contain_text(f" in {camera}: x ")  # the marks of the pulse have come, too
     _walk(page, true - placed, ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"), NUDGES)
 
 

@@ -7,18 +7,20 @@ deviations, which the sides tell; a ski is seen if more than half of its pieces 
 """
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.cameras.frames import LogFrames
 from bench.analysis.hill_logs import HillLog
 from bench.corpus.draws import Scene
 from rig.arrays import Flags, Floats
-from rig.images.picture import Grey
 from simrig.world.projection import Projection
 
+#: Grey values (rows, columns).
+_Image: TypeAlias = NDArray[np.float32]
 #: Tail and fore part, m from the binding.
 _PARTS_M: Final = ((-1.05, -0.3), (0.3, 0.9))
 _ASIDE_M, _ASIDE_PX = 0.07, 2.0  # from the axis to what is beside the ski: half its width and the blur
@@ -40,14 +42,14 @@ def visible_skis(scene: Scene, log: HillLog) -> dict[int, dict[str, int]]:
     present = {number: state for number, state in log.truth.items() if state.get("points")}
     found = {}
     for number, frames in LogFrames(log.path).frames(set(present)):
-        shown = [(image, cameras[name]) for name, image in frames.items()]
+        shown = [(image.astype(np.float32), cameras[name]) for name, image in frames.items()]
         found[int(number)] = {
             side: sum(_seen(image, camera, present[number], side) for image, camera in shown) for side in _BINDINGS
         }
     return found
 
 
-def _seen(image: Grey, camera: Projection, state: Mapping[str, Any], side: str) -> bool:
+def _seen(image: _Image, camera: Projection, state: Mapping[str, Any], side: str) -> bool:
     """Whether a person would see a ski in an image."""
     binding, direction = np.array(state["points"][_BINDINGS[side]]), np.array(state["skis"][side]["direction"])
     distance = float(camera.distance(binding))
@@ -58,7 +60,7 @@ def _seen(image: Grey, camera: Projection, state: Mapping[str, Any], side: str) 
     return bool(len(told) and np.mean(told) > _SHARE)
 
 
-def _stand_out(image: Grey, camera: Projection, ends: Floats, aside: float) -> Flags:
+def _stand_out(image: _Image, camera: Projection, ends: Floats, aside: float) -> Flags:
     """Of the pieces between two places (2, 3) of a ski, which stand out of their sides; none outside of the image."""
     px = camera.pixels(ends)
     length = float(np.hypot(*(px[1] - px[0])))
@@ -76,6 +78,6 @@ def _stand_out(image: Grey, camera: Projection, ends: Floats, aside: float) -> F
     return np.asarray(inside & (np.abs(off) > _SIGMAS * noise * np.sqrt(1.5 / _PIECE_PX)))
 
 
-def _grey(image: Grey, xy: Floats) -> Floats:
+def _grey(image: _Image, xy: Floats) -> Floats:
     x, y = xy.astype(np.float32).T.reshape(2, 1, -1)
-    return np.asarray(cv2.remap(image.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0])
+    return np.asarray(cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0])

@@ -241,6 +241,6 @@ def _rather_left(views: Views, window: Window, flight: Flight, t: int, named: In
     points, at = window.points[t], int(named[BINDINGS].max())
     place, body = points.xyz[at], np.mean([points.xyz[i] for i in named[: _HIP + 1] if i >= 0], axis=0)
     aside = float((place - body) @ flight.axes[1])
-    chance = shown(views, place, flight.axes[1])[BINDINGS][:, points.rays[at] >= 0]
+    chance = shown(views, place[None], flight.axes[1])[BINDINGS][:, points.rays[at] >= 0]
     right, left = np.log(chance).sum(axis=1)
     return float(2 * _HALF_GAP_M * aside / _ASIDE_M**2 + left - right)

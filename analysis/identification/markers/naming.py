@@ -56,7 +56,7 @@ def name_points(views: Views, window: Window, flight: Flight) -> Integers:
         _namings(
             points[t], _worths(views, window.rays[t], window.delivered[t], points[t], of_sides), path[t], flight.axes
         )
-        for t, of_sides in enumerate(shown(views, path, flight.axes[1]))
+        for t, of_sides in enumerate(shown(views, path[:, None], flight.axes[1]))
     ]
     costs = [namings[0].costs]
     came = []

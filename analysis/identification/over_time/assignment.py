@@ -135,8 +135,7 @@ def _options(
     counts = np.array([[len(of.xy) for of in of_camera] for of_camera in rays])
     sizes = np.array([float(np.prod(placed.size)) for placed in views.placed])
     xyz, covariance, known = predicted.xyz[steps], predicted.covariance[steps], known[steps]
-    in_sight = np.stack([shown(views, xyz[:, i], left)[:, i] for i in range(xyz.shape[1])], axis=1)
-    rate = 2 * np.log(2 * np.pi / (DETECTED * in_sight) * (1 + counts.T[:, None]) / sizes)
+    rate = 2 * np.log(2 * np.pi / (DETECTED * shown(views, xyz, left)) * (1 + counts.T[:, None]) / sizes)
     sights = views.see_all(xyz.reshape(-1, 3))
     inside = np.stack([sight.inside.reshape(known.shape) for sight in sights], axis=2)
     expected = known[..., None] & window.delivered[steps][:, None] & inside

@@ -25,12 +25,12 @@ def shown(views: Views, places: Floats, left: Floats) -> Floats:
 
     Args:
         views: the m cameras.
-        places: (..., 3) of the jumper, m.
+        places: (..., 4, 3) of the markers in the order of `POINTS`, or (..., 1, 3) of the jumper, m.
         left: (3,) unit vector to his left side.
 
     Returns:
-        (..., 4, m) in the order of `POINTS`.
+        (..., 4, m).
     """
-    way = np.stack([placed.position for placed in views.placed]) - places[..., None, :]
+    way = views.position - places[..., None, :]
     aside = way @ left / np.linalg.norm(way, axis=-1)
-    return np.asarray(1.0 + _HIDDEN * np.minimum(_SIDE[:, None] * aside[..., None, :], 0.0))
+    return np.asarray(1.0 + _HIDDEN * np.minimum(_SIDE[:, None] * aside, 0.0))

@@ -65,6 +65,7 @@ class Views:
         names: of the cameras.
         placed: the cameras.
         ideal: the cameras without distortion, for `PlacedCamera.reduced` coordinates.
+        position: (m, 3) of the cameras, m.
         exposure_s: (m,) exposure times.
         late_s: (m,) how much later than the mean of all cameras each one shows the scene.
         centre: (3,) the point that all cameras look at.
@@ -79,7 +80,7 @@ class Views:
         self.ideal: Sequence[IdealCamera] = [placed.ideal() for placed in self.placed]
         self.exposure_s = np.array([(exposures_s or {}).get(name, 0.0) for name in self.names])
         self.late_s = (self.exposure_s - self.exposure_s.mean()) / 2
-        self._position = np.array([placed.position for placed in self.placed])
+        self.position = np.array([placed.position for placed in self.placed])
         self._rotation = np.array([placed.rotation for placed in self.placed])
         self._size = np.array([placed.size for placed in self.placed])
         lenses = [placed.camera.lens() for placed in self.placed]
@@ -112,7 +113,7 @@ class Views:
         each = np.repeat(cameras, n)
         points = np.broadcast_to(xyz, (c, n, 3)).reshape(-1, 3)
         lens = Lens(self._lens.interior[each], self._lens.balance[each], self._lens.measured[each])
-        rotation, position, size = self._rotation[each], self._position[each], self._size[each]
+        rotation, position, size = self._rotation[each], self.position[each], self._size[each]
         before = camera_coordinates(rotation, position, points)[:, 2:] < 0
         with np.errstate(all="ignore"):
             metric = np.where(before, image_point(lens, rotation, position, points), np.nan)

@@ -46,14 +46,15 @@ def test_packet_socket(make_camera: MakeCamera) -> None:
     """The way that Aravis takes with CAP_NET_RAW; without it the plain socket is tested twice.
 
     While it sets up the socket Aravis takes foreign streams' packets for its own and may then take the first frames
-    for old ones, so those are not insisted on.
+    for old ones, so those are not insisted on. Nor is every later one: a crowded machine loses packets. But block ids
+    and pulses go on together.
     """
     simulated = make_camera()
     with Receiver(simulated.address, packet_socket=True) as receiver:
         frames = [frame for frame in receiver.frames(60) if frame.status == "success"]
     assert len(frames) > 30
-    assert {later.block_id - earlier.block_id for earlier, later in pairwise(frames)} == {1}
-    assert {later.pulse - earlier.pulse for earlier, later in pairwise(frames)} == {1}
+    steps = [(b.block_id - a.block_id, b.pulse - a.pulse) for a, b in pairwise(frames)]
+    assert all(block_ids == pulses >= 1 for block_ids, pulses in steps), steps
 
 
 @pytest.mark.parametrize("packet_size", [576, 1500, 9000, 65500])

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from photogrammetry.adjustment.equations.relations import Kind
 from photogrammetry.adjustment.solution.adjustment import Adjustment
-from photogrammetry.geometry.camera_model import Lens, camera_coordinates, image_point, linearise, undistort
+from photogrammetry.geometry.camera_model import Lens, camera_coordinates, distort, ideal_point, linearise, undistort
 from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.file import pixel_to_metric
@@ -64,11 +64,12 @@ class PlacedCamera:
 
     def project(self, xyz: ArrayLike) -> Floats:
         """Where object points (..., 3) appear, px (..., 2); NaN behind the camera."""
-        xyz = np.asarray(xyz, float)
+        lens, k = self.camera.lens(), camera_coordinates(self.rotation, self.position, np.asarray(xyz, float))
         with np.errstate(all="ignore"):
-            metric = np.asarray(image_point(self.camera.lens(), self.rotation, self.position, xyz), float)
+            metric = np.asarray(distort(lens, ideal_point(lens.interior[..., 0], k)), float)
         px = metric * _MIRROR + (self.size - 1) / 2
-        return np.where(self.in_front(xyz)[..., None], px, np.nan)
+        px[~(k[..., 2] < 0)] = np.nan
+        return np.asarray(px)
 
     def in_front(self, xyz: ArrayLike) -> Flags:
         """Whether object points (..., 3) lie before the camera."""

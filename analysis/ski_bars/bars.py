@@ -43,9 +43,9 @@ class Poses:
         aside = _unit(np.cross(self.direction, reference))
         return aside, np.cross(aside, self.direction)
 
-    def moved(self, step: Floats) -> "Poses":
-        """With both skis shifted and turned by `step` (2, 5)."""
-        aside, normal = self.axes()
+    def moved(self, step: Floats, axes: tuple[Floats, Floats] | None = None) -> "Poses":
+        """With both skis shifted and turned by `step` (2, 5); `axes` are those of these poses, if they are known."""
+        aside, normal = axes or self.axes()
         turned = self.direction + step[:, 3:4] * aside + step[:, 4:5] * normal
         return Poses(self.point + step[:, :3], _unit(turned))
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.ski_bars.bars import SKIS, ExpectedBars
 from analysis.ski_bars.model import POSE, SHAPE, SHOVEL_M, BarModel, Predicted, hidden_by_boots
@@ -30,13 +31,13 @@ _SIGMAS = 3.0  # residuals that count a quarter
 _MAD_TO_SIGMA = 1.4826
 _TAILS = 1.25  # times m in covariances: the tails of its errors, which their median does not tell
 _BESIDE_PX = 2.0  # beside a ski, whose pixels still tell m
-_ITERATIONS, _ROUNDS = 12, 2
-_ENOUGH = 0.05  # of a standard deviation: a smaller step changes nothing
+_ITERATIONS: Final = 20
+_ENOUGH, _NEAR = 0.05, 0.8  # of a standard deviation: smaller steps change nothing, and not much
+_DAMPED, _DAMPED_MORE = 1e-3, 0.1  # at first, and at least where a step has made the sum larger
 _BLUR_PX, _BLUR_LOG = 0.65, 0.25
 _HALF_M, _HALF_LOG = 0.035, 0.4  # half the width that a ski shows, and its spread
 _GREY_SIGMA = 100.0
 _COVERED = 0.05  # of a pixel by a ski
-_MOST_DAMPED = 1e3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +89,7 @@ class BarFit:
         for c in range(len(self.model.views)):
             here = self.pixels.camera == c
             for k in range(SKIS):
-                core = here & (np.abs(seen.u[:, k]) < 1.0) & (seen.cover[:, k] > 0.5)
+                core = here & (np.abs(seen.u[k]) < 1.0) & (seen.cover[k] > 0.5)
                 if core.any():
                     x[at.brightness[c, k]] = np.median(self.pixels.grey[core])
         return x
@@ -97,37 +98,41 @@ class BarFit:
         """Half the robust sum of squares at unknowns."""
         return self._cost(x, self.model.predicted(self.pixels, x, derivatives=False), model_error)
 
-    def solved(self, x: Floats) -> Estimate:
-        """The minimum near a start: Gauss-Newton with damping."""
-        m = _MODEL
-        for _ in range(_ROUNDS):
-            x, cost = self._minimum(x, m)
-            m, before = self._model_error(x), m
-            if abs(np.log(m / before)) < 0.1:
-                break
-        return Estimate(x, cost, m)
+    def solved(self, x: Floats, model_error: float | None = None) -> Estimate:
+        """The minimum near a start: Gauss-Newton with damping.
 
-    def _minimum(self, x: Floats, m: float) -> tuple[Floats, float]:
-        damping = 1e-3
+        Args:
+            x: unknowns to start from.
+            model_error: m there; None: it is not known, so it is estimated near the minimum first.
+        """
+        if model_error is None:
+            x, _ = self._minimum(x, _MODEL, _NEAR)
+            model_error = self._model_error(x)
+        x, cost = self._minimum(x, model_error, _ENOUGH)
+        return Estimate(x, cost, self._model_error(x))
+
+    def _minimum(self, x: Floats, m: float, enough: float) -> tuple[Floats, float]:
+        """Unknowns at the minimum, and the cost there; `enough`, of a standard deviation, is a step that ends it."""
+        damping = _DAMPED
         seen = self.model.predicted(self.pixels, x)
         fitted = self.fitted(x, seen)
         cost = self._cost(x, seen, m, fitted)
         for _ in range(_ITERATIONS):
             weight = self.weights(x, seen, fitted, m)
-            normal = seen.by_unknowns.T @ (weight[:, None] * seen.by_unknowns) + self.prior
+            normal = (seen.by_unknowns * weight) @ seen.by_unknowns.T + self.prior
             off = self.pixels.grey - seen.grey
-            right = seen.by_unknowns.T @ (weight * off) - self.prior @ self._from_mean(x)
+            right = seen.by_unknowns @ (weight * off) - self.prior @ self._from_mean(x)
             while True:
                 step = np.linalg.solve(normal + damping * np.diag(np.diagonal(normal)), right)
                 tried = self.model.predicted(self.pixels, x + step)
                 less = self._cost(x + step, tried, m, fitted)
-                if less <= cost or damping > _MOST_DAMPED:
+                small = step @ normal @ step < enough**2
+                if less <= cost or small:
                     break
-                damping *= 10
-            if less > cost:
-                break
-            x, seen, damping, cost = x + step, tried, damping / 10, less
-            if step @ normal @ step < _ENOUGH**2:
+                damping = max(10 * damping, _DAMPED_MORE)
+            if less <= cost:
+                x, seen, damping, cost = x + step, tried, damping / 10, less
+            if small:
                 break
         return x, cost
 
@@ -144,34 +149,36 @@ class BarFit:
 
     def _contrast(self, x: Floats) -> Floats:
         """(n,) of the ski that differs more from the static scene there."""
-        bright = x[self.model.unknowns.brightness][self.pixels.camera]
-        off = np.where(np.array(self.model.present), np.abs(bright - self.pixels.behind[:, None]), 0.0)
-        return np.maximum(off[:, 0], off[:, 1])
+        bright = x[self.model.unknowns.brightness].T[:, self.pixels.camera]
+        off = np.where(np.array(self.model.present)[:, None], np.abs(bright - self.pixels.behind), 0.0)
+        return np.maximum(off[0], off[1])
 
     def _model_variance(self, x: Floats, seen: Predicted, m: float) -> Floats:
-        shovel = (seen.s[:, 0] > SHOVEL_M) & np.isfinite(seen.s[:, 0])
-        shovel |= (seen.s[:, 1] > SHOVEL_M) & np.isfinite(seen.s[:, 1])
-        return np.asarray((np.where(shovel, np.hypot(m, _SHOVEL), m) * self._contrast(x)) ** 2)
+        shovel = (seen.s > SHOVEL_M) & np.isfinite(seen.s)
+        return np.asarray((np.where(shovel[0] | shovel[1], np.hypot(m, _SHOVEL), m) * self._contrast(x)) ** 2)
 
     def robust(self, x: Floats, seen: Predicted, m: float) -> Floats:
         """(n,) weights of the pixels: 1 where the model holds, else towards 0."""
-        square = (self.pixels.grey - seen.grey) ** 2 / (self.pixels.noise + self._model_variance(x, seen, m))
+        return self._robust(seen, self._model_variance(x, seen, m))
+
+    def _robust(self, seen: Predicted, model: Floats) -> Floats:
+        square = (self.pixels.grey - seen.grey) ** 2 / (self.pixels.noise + model)
         return np.asarray((_SIGMAS**2 / (square + _SIGMAS**2)) ** 2)
 
     def weights(self, x: Floats, seen: Predicted, fitted: Flags, m: float) -> Floats:
         """(n,) weights in the normal equations: errors that neighbours share count once."""
-        together = self.pixels.noise + _TOGETHER * self._model_variance(x, seen, m)
-        return np.where(fitted, self.robust(x, seen, m) / together, 0.0)
+        model = self._model_variance(x, seen, m)
+        return np.where(fitted, self._robust(seen, model) / (self.pixels.noise + _TOGETHER * model), 0.0)
 
     def fitted(self, x: Floats, seen: Predicted) -> Flags:
         """(n,) which pixels count: those of used images that no boot may hide."""
-        nearest = np.abs(seen.u).argmin(axis=1)
+        nearest = np.abs(seen.u).argmin(axis=0)
         return np.asarray(self.used[self.pixels.camera, nearest] & ~hidden_by_boots(self.model, x, self.pixels))
 
     def _model_error(self, x: Floats) -> float:
         seen = self.model.predicted(self.pixels, x, derivatives=False)
-        near = ((np.abs(seen.u) < seen.half + _BESIDE_PX) & (seen.s < SHOVEL_M)).any(axis=1) & self.fitted(x, seen)
-        near &= (seen.cover > _COVERED).any(axis=1)
+        near = ((np.abs(seen.u) < seen.half + _BESIDE_PX) & (seen.s < SHOVEL_M)).any(axis=0) & self.fitted(x, seen)
+        near &= (seen.cover > _COVERED).any(axis=0)
         if not near.any():
             return _MODEL
         off = np.abs(self.pixels.grey - seen.grey)[near]
@@ -196,23 +203,23 @@ class BarFit:
         Args:
             x: unknowns.
             seen: at these.
-            rows: (n, k) derivatives.
+            rows: (k, n) derivatives.
             fitted: (n,) pixels that count.
             m: error of the model in proportion to the contrast.
         """
         weight = self.weights(x, seen, fitted, m)
-        weighted = weight[:, None] * rows
-        by_noise, by_model = weighted.T @ (self.pixels.noise[:, None] * weighted), np.zeros((rows.shape[1],) * 2)
-        error = _TAILS * np.sqrt(self._model_variance(x, seen, m))[:, None] * weighted
-        nearest = np.abs(seen.u).argmin(axis=1)
-        for c in range(len(self.model.views)):
+        weighted = weight * rows
+        by_noise, by_model = (weighted * self.pixels.noise) @ weighted.T, np.zeros((len(rows),) * 2)
+        error = (_TAILS * np.sqrt(self._model_variance(x, seen, m)) * weighted).astype(np.float32)
+        nearest = np.where(error.any(axis=0), np.abs(seen.u).argmin(axis=0), SKIS)
+        for here in self.pixels.of_cameras(len(self.model.views)):
             for k in np.flatnonzero(self.model.present).tolist():
-                here = np.flatnonzero((self.pixels.camera == c) & (nearest == k) & (np.abs(error).max(axis=1) > 0))
-                alike = np.exp(-_apart(seen.t[here, k]) / _ALONG_PX - _apart(seen.u[here, k]) / _ACROSS_PX)
-                by_model += error[here].T @ (alike @ error[here])
-        return np.asarray(rows.T @ weighted), np.asarray(by_noise), by_model
+                own = here.start + np.flatnonzero(nearest[here] == k)
+                alike = np.exp(-_apart(seen.t[k, own] / _ALONG_PX) - _apart(seen.u[k, own] / _ACROSS_PX))
+                by_model += (error[:, own] @ alike) @ error[:, own].T
+        return np.asarray(rows @ weighted.T), np.asarray(by_noise), by_model
 
 
-def _apart(place: Floats) -> Floats:
+def _apart(place: Floats) -> NDArray[np.float32]:
     values = place.astype(np.float32)
-    return np.asarray(np.abs(values[:, None] - values), np.float64)
+    return np.abs(values[:, None] - values)

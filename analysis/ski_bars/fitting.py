@@ -85,7 +85,7 @@ def _judged(fit: BarFit, found: Estimate, good: Flags, lines: list[list[ImageLin
     if (good != fit.used).any():
         fit.used = good & (good.sum(axis=0) >= _FEWEST)
         if fit.used.any():
-            found = fit.solved(found.x)
+            found = fit.solved(found.x, found.model_error)
             lines = image_lines(fit, found)
             good = _good(lines) & (found.model_error < WORST_MODEL)
             fit.used = good & (good.sum(axis=0) >= _FEWEST)

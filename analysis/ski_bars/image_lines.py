@@ -62,28 +62,26 @@ def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
     poses = model.poses(x)
     lines: list[list[ImageLine | None]] = []
     for c, view in enumerate(model.views):
-        rows = np.zeros((len(off), SKIS * REDUNDANCY))
+        rows = np.zeros((SKIS * REDUNDANCY, len(off)))
         here = fitted & (fit.pixels.camera == c)
         for k in range(SKIS):
-            t = np.where(np.isfinite(seen.t[:, k]), seen.t[:, k], 0.0)
-            rows[:, REDUNDANCY * k] = -seen.by_u[:, k]
-            rows[:, REDUNDANCY * k + 1] = -seen.by_u[:, k] * t
-            rows[:, REDUNDANCY * k + 2] = -seen.by_t[:, k]
+            t = np.where(np.isfinite(seen.t[k]), seen.t[k], 0.0)
+            rows[REDUNDANCY * k : REDUNDANCY * (k + 1)] = -seen.by_u[k], -seen.by_u[k] * t, -seen.by_t[k]
         of_image = np.concatenate(([at.blur[c]], at.width[c], at.brightness[c]))
-        rows = np.where(here[:, None], np.column_stack((rows, seen.by_unknowns[:, of_image])), 0.0)
-        prior = np.zeros((rows.shape[1],) * 2)
+        rows = np.where(here, np.concatenate((rows, seen.by_unknowns[of_image])), 0.0)
+        prior = np.zeros((len(rows),) * 2)
         own = np.tile((_WIDE_PX, _WIDE_RAD, _WIDE_PX), SKIS) ** -2.0
         prior[: len(own), : len(own)] = np.diag(own)
         prior[len(own) :, len(own) :] = fit.prior[np.ix_(of_image, of_image)]
         normal, by_noise, middle = fit.sandwich(x, seen, rows, here, m)
         inverse = np.linalg.inv(normal + prior)
         by_model = inverse @ middle @ inverse
-        step = inverse @ (rows.T @ (weight * off))
+        step = inverse @ (rows @ (weight * off))
         covariance = inverse @ (by_noise + prior) @ inverse + by_model
         of: list[ImageLine | None] = []
         for k in range(SKIS):
-            near = here & (np.abs(seen.u[:, k]) < seen.half[:, k] + _BESIDE_PX)
-            near &= (seen.cover[:, k] > _COVERED) & (seen.s[:, k] < SHOVEL_M)
+            near = here & (np.abs(seen.u[k]) < seen.half[k] + _BESIDE_PX)
+            near &= (seen.cover[k] > _COVERED) & (seen.s[k] < SHOVEL_M)
             if not fit.used[c, k] or near.sum() < 2 * REDUNDANCY:
                 of.append(None)
                 continue

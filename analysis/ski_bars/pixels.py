@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import cv2
@@ -23,7 +24,7 @@ class Pixels:
     """n pixels.
 
     Attributes:
-        camera: (n,) index of the camera.
+        camera: (n,) index of the camera, ascending.
         xy: (n, 2) px.
         grey: (n,) grey value.
         behind: (n,) what the static scene shows there.
@@ -35,6 +36,11 @@ class Pixels:
     grey: Floats
     behind: Floats
     noise: Floats
+
+    def of_cameras(self, count: int) -> list[slice]:
+        """Those of each of so many cameras."""
+        ends = np.searchsorted(self.camera, np.arange(count + 1)).tolist()
+        return [slice(first, last) for first, last in pairwise(ends)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -80,8 +80,13 @@ def ideal_point(c: Numbers, k: Numbers) -> Numbers:
 
 def distortion(lens: Lens, q: Numbers) -> Numbers:
     """d(q) (..., 2), image unit: radial, decentring, affinity, shear; q (..., 2) is reduced to the principal point."""
-    shifts: Numbers = np.einsum("...rk,...k->...r", _terms(lens, q), lens.interior[..., 3:])
-    return shifts
+    x, y = q[..., 0], q[..., 1]
+    a1, a2, a3, b1, b2, c1, c2 = (lens.interior[..., i] for i in range(3, len(INTERIOR)))
+    r2, p2 = x * x + y * y, lens.balance**2
+    radial = a1 * (r2 - p2) + a2 * (r2 * r2 - p2 * p2) + a3 * (r2 * r2 * r2 - p2 * p2 * p2)
+    along_x = x * radial + b1 * (r2 + 2.0 * x * x) + 2.0 * b2 * x * y + c1 * x + c2 * y
+    along_y = y * radial + b2 * (r2 + 2.0 * y * y) + 2.0 * b1 * x * y
+    return np.stack((along_x, along_y), axis=-1)
 
 
 def image_point(lens: Lens, rotation: Numbers, position: Numbers, xyz: Numbers) -> Numbers:

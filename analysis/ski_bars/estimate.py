@@ -151,7 +151,7 @@ class BarFit:
         """(n,) of the ski that differs more from the static scene there."""
         bright = x[self.model.unknowns.brightness].T[:, self.pixels.camera]
         off = np.where(np.array(self.model.present)[:, None], np.abs(bright - self.pixels.behind), 0.0)
-        return np.maximum(off[0], off[1])
+        return np.asarray(np.maximum(off[0], off[1]))
 
     def _model_variance(self, x: Floats, seen: Predicted, m: float) -> Floats:
         shovel = (seen.s > SHOVEL_M) & np.isfinite(seen.s)
@@ -222,4 +222,4 @@ class BarFit:
 
 def _apart(place: Floats) -> NDArray[np.float32]:
     values = place.astype(np.float32)
-    return np.abs(values[:, None] - values)
+    return np.asarray(np.abs(values[:, None] - values))

@@ -133,7 +133,7 @@ class BarModel:
         at, poses = self.unknowns, self.poses(x)
         shape = x[SHAPE].reshape(SKIS, OF_SHAPE)
         feet = self._feet(pixels, poses, shape[:, 0], derivatives=derivatives)
-        c, there = pixels.camera, np.array(self.present)[:, None]
+        c = pixels.camera
         blur = np.exp(x[at.blur])[c]
         half = np.exp(x[at.width]).T[:, c] * feet.scale
         tail, tip = ((feet.s - shape[:, end, None]) * feet.px_per_m for end in (1, 2))
@@ -250,9 +250,7 @@ def normal(value: Floats) -> tuple[Floats, Floats]:
     away = np.minimum(np.abs(value), _FARTHEST)
     density = np.exp(-0.5 * away * away) / _ROOT_TAU
     t = 1 / (1 + 0.2316419 * away)
-    tail = density * t * (
-        0.319381530 + t * (-0.356563782 + t * (1.781477937 + t * (-1.821255978 + t * 1.330274429)))
-    )
+    tail = density * t * (0.319381530 + t * (-0.356563782 + t * (1.781477937 + t * (-1.821255978 + t * 1.330274429))))
     return density, np.where(value < 0, tail, 1 - tail)
 
 

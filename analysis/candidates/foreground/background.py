@@ -31,6 +31,8 @@ _MAD_TO_SIGMA = 1.4826
 _STRIP = 32 << 10  # pixels that are compared at a time
 _FRONT = 4.5  # sigmas: 2 of 300 000 pixels by chance
 _SMALLEST = 12  # px; 15 radii of the smallest marker that can be measured: a jumper is larger
+_SPECK = 8  # pixels of the border of the smallest marker that can be measured
+_REACH = 0.7  # of the length of the largest part of a body that stands out: other parts are not farther from it
 _THINNEST = 3  # px; nothing real is thinner at its thickest, but a row of pixels that hold a number is
 _JOIN = 9  # px: what is nearer to each other belongs together
 _MARGIN = 10  # px around what moves
@@ -285,12 +287,15 @@ def _boxes(front: NDArray[np.uint8], within: tuple[int, int, int, int]) -> list[
     left, top, right, bottom = within
     # Outer borders take a fifth of the time of labels: these need four bytes for each pixel, anew for each image.
     borders, _ = cv2.findContours(front[top:bottom, left:right], cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    boxes = []
-    for x, y, w, h in (cv2.boundingRect(border) for border in borders if len(border) >= _SMALLEST):
+    boxes, specks = [], []
+    for u, v, w, h in (cv2.boundingRect(border) for border in borders if len(border) >= _SPECK):
+        x, y = u + left, v + top
+        wide = x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN
         if max(w, h) >= _SMALLEST and min(w, h) >= _THINNEST:
-            x, y = x + left, y + top
-            area = cv2.countNonZero(front[y : y + h, x : x + w])
-            boxes.append((x - _JOIN, y - _JOIN, x + w + _JOIN, y + h + _JOIN, area))
+            boxes.append((*wide, cv2.countNonZero(front[y : y + h, x : x + w])))
+        else:
+            specks.append(wide)
+    boxes = [_with_specks(box, specks) for box in boxes]
     rows, columns = front.shape
     grown = sorted(_joined(boxes), key=lambda box: -box[4])[:_MOST]
     spare = _MARGIN - _JOIN
@@ -298,6 +303,20 @@ def _boxes(front: NDArray[np.uint8], within: tuple[int, int, int, int]) -> list[
         (max(0, x - spare), max(0, y - spare), min(columns, behind + spare), min(rows, below + spare))
         for x, y, behind, below, _ in grown
     ]
+
+
+def _with_specks(
+    box: tuple[int, int, int, int, int], specks: list[tuple[int, int, int, int]]
+) -> tuple[int, int, int, int, int]:
+    """A box with the specks about it: of a body as dark as what is behind it only the markers may stand out.
+
+    No part of a body is farther from the largest one than this is long, or nearly.
+    """
+    reach = int(_REACH * max(box[2] - box[0], box[3] - box[1]))
+    low, high = (box[0] - reach, box[1] - reach), (box[2] + reach, box[3] + reach)
+    near = [of for of in specks if of[0] > low[0] and of[1] > low[1] and of[2] < high[0] and of[3] < high[1]]
+    x, y, behind, below = zip(box[:4], *near, strict=True)
+    return min(x), min(y), max(behind), max(below), box[4]
 
 
 def _joined(boxes: list[tuple[int, int, int, int, int]]) -> list[tuple[int, int, int, int, int]]:

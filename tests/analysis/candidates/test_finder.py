@@ -33,6 +33,15 @@ def test_dark_markers_on_a_light_suit_are_found_as_well() -> None:
     assert 0.3 < verdict.squares.mean() < 1.8
 
 
+def test_of_a_jumper_as_dark_as_what_is_behind_him_all_markers_are_found() -> None:
+    """A dark suit before a forest: skis and markers stand out, and nothing joins them."""
+    dusk = {"background_scale": 0.0, "background_offset": 30.0}
+    unseen = Hill(scenario(image=dusk, jumper={"suit": 30.0, "patch": 30.0, "skis": 110.0}))
+    verdict = judged(unseen, PULSES)
+    assert verdict.found >= 0.85 * verdict.clear > 40  # without what is about the skis: 28 of 48
+    assert verdict.false < 5 * verdict.images  # flakes of snow
+
+
 def test_numbers_written_into_the_images_are_no_candidates() -> None:
     stamped = Hill(scenario().model_copy(update={"stamp": True}))
     for image in stamped.find(85).images.values():

@@ -33,11 +33,13 @@ class Row:
         place: file and line, for messages.
         cells: without quotes and without blanks around them.
         comment: whether it is one; its mark is no part of the cells.
+        text: the line; `q` stands for what is in quotes.
     """
 
     place: str
     cells: tuple[str, ...]
     comment: bool
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,7 @@ def read_rows(path: Path) -> Rows:
         comment, place = _is_comment(line), f"{path}: line {number}"
         cells = _comment_cells(line, separator) if comment else _cells(line, separator, place)
         if any(cells):
-            rows.append(Row(place, tuple(cells), comment))
+            rows.append(Row(place, tuple(cells), comment, _QUOTED.sub("q", line)))
     return Rows(tuple(rows), separator, notes)
 
 

@@ -47,6 +47,8 @@ _MORE: Final[Mapping[str, frozenset[str]]] = {
 }
 _WITH_SIGMA: Final = ("name", "x", "y", "z", "sx")
 _FEWEST_NAMED: Final = 3  # columns, in a comment that is a head
+#: Blanks that may be an empty cell.
+_WIDE: Final = re.compile(r"^[ \t]|[ \t]{2}|[ \t]$")
 _WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
 #: Axes of a surveyor, by what they are: X is east, Y north, Z height, which is right-handed.
 _SURVEYORS: Final = {
@@ -101,7 +103,11 @@ def read_lines(path: Path) -> tuple[list[Line], tuple[str, ...]]:
         _check_unnamed(file.separator, words, path)
         if file.separator in (" ", ",") and "sx" in columns:
             _check_even(body, columns)
+        if file.separator == " " and "sx" in columns:
+            _check_blanks(body, columns)
         _check_ids(cells, path)
+    elif file.separator == " ":
+        _check_hidden(body, columns)
     lines = [_line(row, each, points, ending) for row, each in zip(body, cells, strict=True)]
     hidden = sum(row.comment and sum(is_number(word) for word in row.cells) >= _FEWEST_NAMED for row in file.rows)
     left_out = (f"{path.name}: {hidden} lines of numbers are comments (# or !) and left out",) if hidden else ()
@@ -213,6 +219,25 @@ def _check_even(body: Sequence[Row], columns: Sequence[str]) -> None:
         )
 
 
+def _check_blanks(body: Sequence[Row], columns: Sequence[str]) -> None:
+    """Refuse points separated by blanks, without named columns, where a cell may be empty or belong to the name.
+
+    Raises:
+        BadInputError: a line that has not all cells has more than one blank at a place; or some cells behind the names
+            of object points are whole numbers, and other coordinates in lines of as many cells are none.
+    """
+    for row in body:
+        if _WIDE.search(row.text) and len(row.cells) < len(columns):
+            raise BadInputError(
+                f"{row.place}: several blanks at one place, which may be an empty cell; name the columns in the first "
+                "line, or separate the cells by semicolons"
+            )
+        alike = [word for other in body if len(other.cells) == len(row.cells) for word in other.cells[1:4]]
+        decimals = columns[0] == "name" and any(is_number(word) and not _is_whole(word) for word in alike)
+        if decimals and row.cells[1:] and row.cells[1].isdecimal():
+            raise _may_be_one(row.cells[0], row.cells[1], " ", row)
+
+
 def _check_ids(cells: Sequence[Mapping[str, str]], path: Path) -> None:
     """Refuse lines without named columns that may begin with two names: whole numbers, then coordinates.
 
@@ -248,10 +273,30 @@ def _check_names(separator: str, body: Sequence[Row]) -> None:
     for row in body:
         name, more = row.cells[0], "".join(row.cells[1:2])
         if more.isdecimal() and (name.isalpha() or (name.isdecimal() and rarely)):
-            one = separator.join(row.cells[:2])
-            raise BadInputError(
-                f'{row.place}: {one!r} may be one name; separate the cells by semicolons, or write "..." around it'
-            )
+            raise _may_be_one(name, more, separator, row)
+        second = "".join(row.cells[2:3])  # of image points, behind the image
+        if more.isalpha() and second.isdecimal():
+            raise _may_be_one(more, second, separator, row)
+
+
+def _check_hidden(body: Sequence[Row], columns: Sequence[str]) -> None:
+    """Refuse lines in which blanks may hide an empty cell while a name of two words takes its place.
+
+    Raises:
+        BadInputError: one blank separates a name from digits alone, and several are at another place.
+    """
+    place = columns.index("name") if "name" in columns else 0
+    hidden = re.compile(rf"[ \t]*(\S+[ \t]+){{{place}}}\S+[ \t]\S.*([ \t]{{2}}|[ \t]$)")
+    for row in body:
+        if row.cells[place + 1 :] and row.cells[place + 1].isdecimal() and hidden.match(row.text):
+            raise _may_be_one(row.cells[place], row.cells[place + 1], " ", row)
+
+
+def _may_be_one(name: str, more: str, separator: str, row: Row) -> BadInputError:
+    one = f"{name}{separator}{more}"
+    return BadInputError(
+        f'{row.place}: {one!r} may be one name; separate the cells by semicolons, or write "..." around it'
+    )
 
 
 def _line(row: Row, cells: Mapping[str, str], points: Mapping[str, str], ending: str) -> Line:

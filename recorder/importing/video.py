@@ -1,11 +1,10 @@
-"""A video of a camera, decoded frame by frame."""
+"""A video of a camera, decoded frame by frame, each with the number that its time gives it."""
 
 import re
 from array import array
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from itertools import count
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +15,7 @@ from av.container import InputContainer
 from av.error import FFmpegError
 from av.video.stream import VideoStream
 
+from recorder.importing.frame_times import frame_numbers
 from recorder.importing.grey import bits_of, grey_of
 from recorder.importing.source import Taken
 from rig.clocks import NS_PER_S, UtcNs
@@ -30,7 +30,7 @@ _OWN_FILE_ONLY: Final = {"protocol_whitelist": "pipe"}
 
 
 class Video:
-    """The first video stream of a file. Its frames count from 1.
+    """The first video stream of a file. Its frames count from 1; where their times have a gap, frames were lost.
 
     Args:
         path: the file.
@@ -43,8 +43,8 @@ class Video:
     def __init__(self, path: Path, rate_hz: float) -> None:
         self.path, self._rate_hz = path, rate_hz
         self.first = 1
-        self._ticks = array("q")  # the times of the frames that were read, in units of `_tick_s`
-        self._untimed = self._frames = 0
+        self._ticks, self._numbers = array("q"), array("q")  # of the frames that were read; units of `_tick_s`
+        self._untimed = self._frames = self._last = 0
         self._broken = ""
         with _opened(path) as (container, stream):
             frame = next(_decoded(container, stream), None)
@@ -77,6 +77,8 @@ class Video:
                 f"the file plays {self.file_rate_hz:.6g} frames a second; --rate says that {self._rate_hz:.6g} were"
                 " taken"
             )
+        if lost := self._last - self._frames:
+            found.append(f"frames left out among its times: {lost}; these frames are lost")
         if times := self._times_in_words():
             found.append(times)
         if self._broken:
@@ -91,26 +93,55 @@ class Video:
         Raises:
             BadInputError: there is no such frame, or frames differ in size or pixels.
         """
-        self._ticks, self._untimed, self._frames, self._broken = array("q"), 0, 0, ""
+        self._ticks, self._numbers, self._broken = array("q"), array("q"), ""
+        self._untimed = self._frames = self._last = 0
         if first < 1:
             raise BadInputError(f"{self.path}: has no frame {first}: its frames count from 1; correct --start")
+        numbers = self._numbers_by_time()
         with _opened(self.path) as (container, stream):
             frames = _decoded(container, stream)
-            for number in count(1):
+            while True:
                 try:
                     frame = next(frames, None)
                 except FFmpegError as error:
-                    self._broken = f"breaks off after frame {self._frames}: {error.strerror}"
+                    self._broken = f"breaks off after frame {self._last}: {error.strerror}"
                     break
                 if frame is None:
                     self._broken = self._cut_short()
                     break
-                self._frames = number
+                before, self._last = self._last, self._number(frame, numbers)
+                self._frames += 1
                 self._note_time(frame)
-                if number >= first:
-                    yield self._taken(number, frame)
-        if self._frames < first:
-            raise BadInputError(f"{self.path}: has no frame {first}: it has {self._frames} frames; correct --start")
+                for lost in range(max(before + 1, first), self._last):
+                    why = f"{self.path} has no frame {lost}, by the times of those beside it"
+                    yield Taken(lost, None, FrameStatus.LOST, why)
+                if self._last >= first:
+                    yield self._taken(self._last, frame)
+        if self._last < first:
+            raise BadInputError(f"{self.path}: has no frame {first}: it has {self._last} frames; correct --start")
+
+    def _numbers_by_time(self) -> dict[int, int]:
+        """The numbers of the frames by their times in the file; none where times do not tell."""
+        with _opened(self.path) as (container, stream):
+            try:
+                found = {packet.pts for packet in container.demux(stream) if packet.pts is not None}
+            except FFmpegError:  # the frames before the damage count one by one, and then it is said
+                return {}
+        ticks = np.array(sorted(found), np.int64)
+        if (told := frame_numbers(ticks)) is None:
+            return {}
+        numbers, period = told
+        if self._tick_s and numbers[-1] > len(numbers):
+            self.file_rate_hz = 1.0 / (period * self._tick_s)
+        return dict(zip(ticks.tolist(), numbers.tolist(), strict=True))
+
+    def _number(self, frame: VideoFrame, numbers: Mapping[int, int]) -> int:
+        """Number of a frame; the first one that is shown is frame 1."""
+        number = None if frame.pts is None else numbers.get(frame.pts)
+        earlier = numbers.get(self._ticks[0]) if self._ticks else number
+        if number is None or earlier is None or (told := number - earlier + 1) <= self._last:
+            return self._last + 1
+        return told
 
     def _taken(self, number: int, frame: VideoFrame) -> Taken:
         if frame.is_corrupt:
@@ -127,14 +158,15 @@ class Video:
             self._untimed += 1
         else:
             self._ticks.append(frame.pts)
+            self._numbers.append(self._last)
 
     def _cut_short(self) -> str:
         """What the file says of frames that are not there, in words; empty: nothing."""
         if self._declared is not None and self._frames < self._declared:
             return f"ends after frame {self._frames}, and the file speaks of {self._declared}"
         expected = self.expected
-        if self._declared is None and expected is not None and self._frames < expected - 1:
-            return f"ends after frame {self._frames}, and by its duration it has {expected}"
+        if self._declared is None and expected is not None and self._last < expected - 1:
+            return f"ends after frame {self._last}, and by its duration it has {expected}"
         return ""
 
     def _times_in_words(self) -> str:
@@ -146,18 +178,19 @@ class Video:
         if len(self._ticks) < 3:
             return ""
         ticks = np.frombuffer(self._ticks, np.int64) - self._ticks[0]
-        even = np.linspace(0.0, float(ticks[-1]), len(ticks))
+        steps = np.frombuffer(self._numbers, np.int64) - self._numbers[0]
+        period = max(float(ticks[-1]) / int(steps[-1]), 1e-9)
         if self.file_rate_hz is not None and self._tick_s and abs(self.file_rate_hz / self._rate_hz - 1) <= _OTHER_RATE:
-            even = np.arange(len(ticks)) / (self._rate_hz * self._tick_s)
-        off = ticks - even
+            period = 1.0 / (self._rate_hz * self._tick_s)
+        off = ticks - period * steps
         worst = int(np.abs(off).argmax())
-        period = max(float(even[-1]) / (len(ticks) - 1), 1e-9)
-        if abs(off[worst]) <= 1:  # the file rounds to whole ticks
+        size = abs(off[worst])
+        if size <= 1:  # the file rounds to whole ticks
             return ""
         return (
-            f"its frames do not come evenly: frame {worst + 1} is {abs(off[worst]) * self._tick_s * 1e3:.1f} ms "
-            f"({abs(off[worst]) / period:.2f} frames) {'later' if off[worst] > 0 else 'sooner'} than the rate says, by "
-            "the times in the file; pulses are told by frame numbers all the same"
+            f"its frames do not come evenly: frame {self._numbers[worst]} is {size * self._tick_s * 1e3:.1f} ms "
+            f"({size / period:.2f} frames) {'later' if off[worst] > 0 else 'sooner'} than the rate says, by the times "
+            "in the file; pulses are told by frame numbers all the same"
         )
 
 

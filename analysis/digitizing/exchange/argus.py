@@ -110,9 +110,7 @@ def read_argus(
     Raises:
         BadInputError: the file is none of Clicker, or does not fit the log.
     """
-    values = read_matrix(path)
-    with path.open(encoding="utf-8-sig") as file:
-        headings = [heading.strip() for heading in file.readline().split(",")]
+    headings, values = read_matrix(path)
     names = list(dict.fromkeys(heading.rsplit("_", 3)[0] for heading in headings))
     views = range(1, len(cameras) + 1)
     if headings != [f"{n}_cam_{c}_{a}" for n in names for c in views for a in "xy"] or values.shape[1] != len(headings):

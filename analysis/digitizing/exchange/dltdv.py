@@ -122,12 +122,18 @@ def read_dltdv(
         raise BadInputError(f"{path}: is no file of DLTdv; name its ...xypts.csv or ...xypts.tsv")
     beside = path.with_name(beginning + "names.csv")
     named = _read_names(beside) if beside.exists() else _Names(pulses.start, list(cameras), list(things), ())
-    values = read_matrix(path)
+    headings, values = read_matrix(path)
     t, m = len(named.tracks), len(named.cameras)
     if not t or values.shape[1] != 2 * t * m:
         raise BadInputError(
             f"{path}: has {values.shape[1]} columns, and {t} points in {m} cameras are {2 * t * m}: say which things "
             f"its points are, in {beside.name} beside it"
+        )
+    expected = [f"pt{p}_cam{c}_{a}" for p in range(1, t + 1) for c in range(1, m + 1) for a in "XY"]
+    if headings != expected[: len(headings)]:  # of a sparse table the last columns may be empty
+        raise BadInputError(
+            f"{path}: its columns are not in the order of DLTdv (pt1_cam1_X, pt1_cam1_Y, pt1_cam2_X, ...); put them "
+            "into it"
         )
     for name in named.cameras:
         if name not in cameras:
@@ -174,8 +180,12 @@ def _read_names(path: Path) -> _Names:
         rows = list(csv.reader(io.StringIO(path.read_text("utf-8-sig"))))[1:]
         said = {row[0]: row[1:] for row in rows if row}
         cameras = [said[f"cam{place}"] for place in range(1, sum(each.startswith("cam") for each in said) + 1)]
+        names = [row[0] for row in cameras]
         tracks = [said[f"pt{place}"][0] for place in range(1, sum(each.startswith("pt") for each in said) + 1)]
         removed = [row[0] for row in cameras if row[1] == _REMOVED]
-        return _Names(int(said["frame1"][0]), [row[0] for row in cameras], tracks, removed)
+        found = _Names(int(said["frame1"][0]), names, tracks, removed)
     except (KeyError, IndexError, ValueError, csv.Error) as error:
         raise BadInputError(f"{path}: does not name the columns of a file of DLTdv ({error}); write it again") from None
+    if len(said) < len(list(filter(None, rows))) or any(len(set(each)) < len(each) for each in (names, tracks)):
+        raise BadInputError(f"{path}: a point, a camera or a column stands twice; write it again")
+    return found

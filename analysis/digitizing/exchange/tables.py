@@ -24,8 +24,8 @@ def table(headings: Sequence[str] | None, values: Floats, separator: str = ",") 
     return text.getvalue().encode()
 
 
-def read_matrix(path: Path) -> Floats:
-    """The numbers of a table below its headings, (rows, columns); NaN where there are none.
+def read_matrix(path: Path) -> tuple[list[str], Floats]:
+    """The headings of a table, and the numbers below them, (rows, columns); NaN where there are none.
 
     A name that ends in `.tsv` is that of a sparse table: headings, a line with the numbers of rows, columns and
     entries, then row, column (both from 1) and value, separated by tabs; 0 means that there is none.
@@ -34,10 +34,12 @@ def read_matrix(path: Path) -> Floats:
         BadInputError: missing, unreadable, or no such table.
     """
     text = read_bytes(path, "CSV", "an existing file").decode("utf-8-sig", "replace")
-    lines = [line for line in text.replace("\r\n", "\n").replace("\r", "\n").split("\n")[1:] if line.strip()]
+    first, *lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     sparse = path.name.endswith(".tsv")
+    separator = "\t" if sparse else ","
+    headings = [heading.strip().strip('"') for heading in first.strip().split(separator)]
     try:
-        rows = [[_number(word) for word in line.split("\t" if sparse else ",")] for line in lines]
+        rows = [[_number(word) for word in line.split(separator)] for line in lines if line.strip()]
         values = np.array(rows, float)
     except ValueError as error:
         raise BadInputError(
@@ -45,7 +47,7 @@ def read_matrix(path: Path) -> Floats:
         ) from None
     if values.ndim != 2:
         raise BadInputError(f"{path}: holds no rows; name a file with points")
-    return _dense(path, values) if sparse else values
+    return headings, _dense(path, values) if sparse else values
 
 
 def _number(word: str) -> float:

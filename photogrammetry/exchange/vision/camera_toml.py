@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from photogrammetry.exchange.part import Part
 from photogrammetry.exchange.vision.pinhole import Pinhole, camera_entry, pose_entry
@@ -23,11 +23,20 @@ from rig.settings.strict_toml import read_toml, validate
 
 #: Tables that are no cameras.
 _OTHERS: Final = ("metadata", "capture_volume", "charuco", "checkerboard")
+#: Keys of a camera that say nothing of how it projects, as caliscope and FreeMoCap write them.
+_HARMLESS: Final = frozenset(
+    {
+        *("cam_id", "port", "rotation_count", "error", "exposure", "grid_count", "ignore", "verified_resolutions"),
+        *("world_position", "world_orientation"),
+    }
+)
 _WHAT: Final = "calibration of anipose"
 
 
 class _Camera(BaseModel):
-    """A camera's table; other keys say nothing of how it projects."""
+    """A camera's table. A key that nobody knows may say how it projects, and is refused."""
+
+    model_config = ConfigDict(extra="forbid")
 
     name: str | None = None
     size: Annotated[list[Finite], Field(min_length=2, max_length=2)]
@@ -54,12 +63,15 @@ def read_camera_toml(path: Path) -> Part:
     images: dict[str, dict[str, Any]] = {}
     notes: list[str] = []
     for key, table in found.items():
-        given = validate(_Camera, table, f"{path}: {key}")
+        known = {name: value for name, value in table.items() if name not in _HARMLESS}
+        given = validate(_Camera, known, f"{path}: {key}")
         name = given.name or key
         if name in cameras:
             raise BadInputError(f"{path}: two cameras are called {name!r}; rename one")
         cameras[name], said = camera_entry(_pinhole(given, f"{path}: {key}"), f"{path}: {key}", "OpenCV")
         notes += [f"camera {name}: {note}" for note in said]
+        if (given.rotation is None) is not (given.translation is None):
+            raise BadInputError(f"{path}: {key}: a pose is rotation and translation; write both, or none of them")
         if given.rotation is not None and given.translation is not None:
             pose = pose_entry(rotation_from_vector(np.array(given.rotation)), np.array(given.translation))
             images[name] = {"camera": name, **pose}

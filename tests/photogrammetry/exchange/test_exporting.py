@@ -211,6 +211,16 @@ def test_toml_of_others_is_read_or_refused(tmp_path: Path) -> None:
     path.write_text(f"[cam_1]\n{table}fisheye = true\n")
     with pytest.raises(BadInputError, match="fisheye cannot be carried over"):
         import_network([path])
+    path.write_text(f"[cam_1]\nport = 1\n{table}error = 0.1\nworld_position = [0.0, 0.0, 0.0]\n")
+    assert [camera.name for camera in import_network([path]).network.cameras] == ["cam_1"]
+    for more, said in (
+        ("rotation = [0.1, 0.2, 0.3]\n", "cam_1: a pose is rotation and translation; write both"),
+        ("xi = 0.9\n", 'cam_1: unknown key "xi"'),
+        ('distortion_model = "equidistant"\n', 'cam_1: unknown key "distortion_model"'),
+    ):
+        path.write_text(f"[cam_1]\n{table}{more}")
+        with pytest.raises(BadInputError, match=said):
+            import_network([path])
     path.write_text("[metadata]\nerror = 0.0\n")
     with pytest.raises(BadInputError, match="no camera in it"):
         import_network([path])

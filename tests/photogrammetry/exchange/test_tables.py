@@ -142,6 +142,46 @@ def test_lines_with_other_numbers_of_cells_are_refused_where_columns_have_no_nam
 
 
 @pytest.mark.parametrize(
+    ("text", "pattern"),
+    [
+        ("B1 10.5  3.5 0.01\nB2 11.5  4.5 0.01\n", "line 1: several blanks at one place, which may be an empty cell"),
+        (" 10.5 20.5 3.5 0.01\n", "line 1: several blanks at one place"),
+        ("B1 10.5 20.5 3.5 0.01 0.01 \n", "line 1: several blanks at one place"),
+        ("K1 7 10.5 20.5 3.5\nK1 8 11.5 21.5 4.5\n", "line 1: 'K1 7' may be one name"),
+        ("name X Y Z s\nK1 7 10.5 20.5  0.01\n", "line 2: 'K1 7' may be one name"),
+        ("K1 7 10.5 20 3\nK2 8 11 21.5 4\n", "line 1: 'K1 7' may be one name"),
+    ],
+)
+def test_object_points_whose_cells_may_be_others_are_refused(text: str, pattern: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=pattern):
+        import_network([_file(tmp_path, text, "points.obc")])
+
+
+@pytest.mark.parametrize(
+    ("text", "pattern"),
+    [
+        ("2 Ball 1 -130 98.960 0.012\n", "line 1: 'Ball 1' may be one name"),
+        ("1 7  98.960 0.012\n", "line 1: several blanks at one place"),
+        ("image name x y s\n2 K1 7 4.25 3.5 \n", "line 2: 'K1 7' may be one name"),
+    ],
+)
+def test_image_points_whose_cells_may_be_others_are_refused(text: str, pattern: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=pattern):
+        import_network([_file(tmp_path, text, "points.phc"), _file(tmp_path, "7 20 0 0\n", "a.ior")], sigma_mm=0.001)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "B1   10.5   20.25   3.5   0.01   0.01   0.02\n  B2 11.5 21.25 4.5 0.01 0.01 0.02\n",
+        "# point X Y Z sX sY sZ\nB1   10.5   20.25   3.5   0.01   0.01   0.02\nB2 11.5 21.25 4.5 0.01 0.01 0.02\n",
+    ],
+)
+def test_object_points_in_wide_columns_are_read_where_none_is_empty(text: str, tmp_path: Path) -> None:
+    assert _points(_file(tmp_path, text, "points.obc")) == BALLS
+
+
+@pytest.mark.parametrize(
     ("name", "text"),
     [
         ("dup.obc", "1 10 20 3 0.001\n1 10 20 9 0.001\n2 11 21 4 0.001\n"),
@@ -201,6 +241,7 @@ _DIALECTS: Final = st.fixed_dictionaries(
         "sep": st.booleans(),
         "encoding": st.sampled_from(("utf-8", "utf-8-sig", "utf-16", "latin-1")),
         "end": st.sampled_from(("\n", "\r\n")),
+        "ending": st.sampled_from((".csv", ".obc")),
     }
 )
 _MEASURED: Final = st.decimals(-200, 200, places=3).map(lambda value: f"{value:.3f}")
@@ -211,7 +252,7 @@ _ROWS: Final = st.integers(0, 3).flatmap(
     lambda sigmas: st.lists(
         st.tuples(
             st.one_of(
-                st.sampled_from(("B1", "Ball 1", "7", "kant Ø", 'B"1', "0317", "1,5", "a;b", "North", "#1")),
+                st.sampled_from(("B1", "Ball 1", "7", "kant Ø", 'B"1', "0317", "1,5", "a;b", "North", "#1", "K1 7")),
                 st.text("aB1 ,;.Ø\"'#", min_size=1, max_size=5),
             ),
             *[_VALUES] * 3,
@@ -243,7 +284,7 @@ def _written(rows: list[tuple[str, ...]], dialect: dict[str, Any]) -> bytes:
 def test_a_table_in_any_dialect_is_read_right_or_refused(
     rows: list[tuple[str, ...]], dialect: dict[str, Any], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    path = _file(tmp_path_factory.getbasetemp(), _written(rows, dialect), "any.csv")
+    path = _file(tmp_path_factory.getbasetemp(), _written(rows, dialect), f"any{dialect['ending']}")
     try:
         imported = import_network([path])
     except BadInputError:
@@ -253,8 +294,9 @@ def test_a_table_in_any_dialect_is_read_right_or_refused(
     expected = {}
     for name, *cells in rows:
         if (name, *cells) not in hidden:
-            values = [float(cell) for cell in cells]  # an empty cell is never read
-            expected[name.strip()] = (values[:3], values[3:] if len(values) == 6 else values[3:] * 3)
+            xyz = [float(cell) for cell in cells[:3]]  # an empty one is never read
+            sigma = [float(cell) for cell in cells[3:]] if any(cells[3:]) else None  # nor are some beside others
+            expected[name.strip()] = (xyz, sigma * 3 if sigma is not None and len(sigma) == 1 else sigma)
     assert _points(path) == expected
     if any(all(row[1:]) for row in hidden):
         assert any("are comments" in note for note in imported.notes)

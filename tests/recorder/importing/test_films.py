@@ -110,11 +110,34 @@ def test_luma_is_spread_over_all_values(stored: str, bits: int, tmp_path: Path) 
     assert np.abs(found * (255 / ((1 << bits) - 1)) - ramp).max() < 1.6  # FFmpeg rounds limited range twice
 
 
+@pytest.mark.parametrize(("rate", "played"), [(50, 50), (30, 30), (240, 240), (240, 30)])
+@pytest.mark.parametrize("dropped", [(6,), (2, 3, 9), (11,)])
+def test_a_frame_that_was_dropped_is_lost_and_those_behind_it_keep_their_numbers(
+    dropped: tuple[int, ...], rate: int, played: int, tmp_path: Path
+) -> None:
+    numbers = [number for number in range(1, 13) if number not in dropped]
+    frames = [picture(number) for number in numbers]
+    ticks = [round((number - 1) * 1000 / played) for number in numbers]
+    film = Video(write_video(tmp_path / "K1.mkv", frames, ticks=ticks), rate)
+    taken = list(film.frames(1))
+    assert [each.number for each in taken] == list(range(1, 13))
+    assert [each.number for each in taken if each.status is FrameStatus.LOST] == list(dropped)
+    assert all(np.array_equal(each.pixels, picture(each.number)) for each in taken if each.pixels is not None), (
+        "each frame has the number of its time"
+    )
+    assert f"frames left out among its times: {len(dropped)}; these frames are lost" in film.remarks
+    assert not any("evenly" in remark for remark in film.remarks)
+    assert next(film.frames(dropped[0])).status is FrameStatus.LOST
+
+
 def test_frames_that_do_not_come_evenly_are_said(tmp_path: Path) -> None:
-    ticks = [0, 20, 40, 60, 80, 120, 140, 160, 180, 200]
+    ticks = [0, 20, 40, 60, 80, 110, 120, 140, 160, 180]
     film = Video(write_video(tmp_path / "K1.mkv", FRAMES, ticks=ticks), 50)
-    assert len(list(film.frames(1))) == 10
-    assert "frame 6 is 20.0 ms (1.00 frames) later than the rate says" in film.remarks[-1]
+    assert [each.number for each in film.frames(1)] == list(range(1, 11))
+    assert "frame 6 is 10.0 ms (0.50 frames) later than the rate says" in film.remarks[-1]
+    hasty = [0, 20, 40, 60, 100, 101, 120, 140, 160, 180]  # one that was written late is not dropped
+    film = Video(write_video(tmp_path / "K3.mkv", FRAMES, ticks=hasty), 50)
+    assert [each.number for each in film.frames(1)] == list(range(1, 11))
     slow = Video(write_video(tmp_path / "K2.mkv", FRAMES), 200)
     list(slow.frames(1))
     assert slow.remarks == ("the file plays 50 frames a second; --rate says that 200 were taken",)

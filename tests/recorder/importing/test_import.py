@@ -68,6 +68,24 @@ def test_a_log_of_films_is_a_log(
     assert "without a trigger" in log_facts(out).messages[1].text
 
 
+def test_a_frame_that_one_camera_dropped_mixes_no_pulses(tmp_path: Path) -> None:
+    left = write_folder(tmp_path / "left", range(1, 11))
+    numbers = [1, 2, 3, 4, 6, 7, 8, 9, 10]
+    ticks = [20 * (number - 1) for number in numbers]
+    right = write_video(tmp_path / "right.mkv", [picture(number) for number in numbers], ticks=ticks)
+    report = Import(ImportOrder([("K1", left), ("K2", right)], 50.0, tmp_path / "films.mcap")).run()
+    assert report.findings == (
+        f"pulse 5: K2 lost: {right} has no frame 5, by the times of those beside it",
+        "K2: frames left out among its times: 1; these frames are lost",
+    )
+    assert verify(report.path).verdict is Verdict.PARTIAL
+    for pulse, (tag, image) in enumerate(triplets(report.path), 1):
+        assert [camera.status.value for camera in tag.cameras] == ["ok", "lost" if pulse == 5 else "ok"]
+        for camera in tag.cameras:
+            there = camera.status.value == "ok"
+            assert np.array_equal(image[camera.part], picture(pulse) if there else np.zeros((48, 64)))
+
+
 def test_other_commands_take_it(
     films: tuple[Path, Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

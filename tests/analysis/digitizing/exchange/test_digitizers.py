@@ -155,6 +155,32 @@ def test_files_of_dltdv_are_read(tmp_path: Path) -> None:
         read_dltdv(path, ["K1"], PULSES, things=["P1"])
 
 
+def test_columns_in_another_order_are_refused(tmp_path: Path) -> None:
+    """Columns are known by their places: a spreadsheet that moved them would give each point the places of another."""
+    path = tmp_path / "a_xypts.csv"
+    path.write_text("pt2_cam1_X,pt2_cam1_Y,pt1_cam1_X,pt1_cam1_Y\n1,2,3,4\n")
+    with pytest.raises(BadInputError, match="its columns are not in the order of DLTdv"):
+        read_dltdv(path, ["K1"], PULSES, things=["P1", "P2"])
+    path.write_text("pt1_cam1_Y,pt1_cam1_X\n1,2\n")
+    with pytest.raises(BadInputError, match="its columns are not in the order of DLTdv"):
+        read_dltdv(path, ["K1"], PULSES, things=["P1"])
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "frame1,101,\ncam1,K1,as measured\npt1,P1,\npt2,P1,\n",
+        "frame1,101,\ncam1,K1,as measured\npt1,P1,\npt1,P2,\npt2,P3,\n",
+    ],
+)
+def test_a_thing_twice_is_refused(rows: str, tmp_path: Path) -> None:
+    path = tmp_path / "a_xypts.csv"
+    path.write_text("pt1_cam1_X,pt1_cam1_Y,pt2_cam1_X,pt2_cam1_Y\n1,2,3,4\n")
+    (tmp_path / "a_names.csv").write_text(f"column,name,coordinates\n{rows}")
+    with pytest.raises(BadInputError, match="a point, a camera or a column stands twice"):
+        read_dltdv(path, ["K1"], PULSES)
+
+
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_points_of_argus_come_back(kind: str, tmp_path: Path) -> None:
     system = SYSTEMS[kind]

@@ -39,9 +39,11 @@ class Case:
         every_s: time between two steps, reboots, suspensions or pauses.
         slips_ms: by how much the times of frames are off from then on, in turns, while the clock that is read goes on.
         at_miss: the camera whose clock is set, or whose times slip, misses the pulse.
+        at_loss: the camera's frame at the trouble is lost.
         together: all clocks are set, or slip, at once.
         spikes_ms: by how much the time of a single frame is off, in turns; then it goes on as before.
         stalls_ms: for how long the computer takes no frames; then it takes all at once.
+        delays_ms: by how much later the frames of all cameras come from then on, in turns.
         skipped_ids: by how much the numbers of frames go on without any frame, in turns.
         doubled: probability of a second pulse, `double_ms` later; half of them hide the first from some cameras.
     """
@@ -52,9 +54,11 @@ class Case:
     steps_ms: tuple[float, ...] = ()
     slips_ms: tuple[float, ...] = ()
     at_miss: bool = False
+    at_loss: bool = False
     together: bool = False
     spikes_ms: tuple[float, ...] = ()
     stalls_ms: tuple[float, ...] = ()
+    delays_ms: tuple[float, ...] = ()
     skipped_ids: tuple[int, ...] = ()
     every_s: float = 20.0
     reboots: bool = False
@@ -107,6 +111,7 @@ class _Camera:
     offset: int = 0
     slip: int = 0
     spike: int = 0
+    loses: bool = False
     next_id: int = 1
     busy_until: float = -math.inf
     away_until: float = -math.inf
@@ -138,7 +143,7 @@ class Hill:
         self._times: dict[int, float] = {}  # true time of the pulses that may still be decided
         self._decided: set[int] = set()
         self._suspensions: list[tuple[float, float]] = []
-        self._slept = self._stalled_until = 0.0
+        self._slept = self._stalled_until = self._delay = 0.0
         self._next_trouble = max(_QUIET_S, case.every_s) * NS_PER_S
         self._troubles = self._count = 0
         self._held: dict[int, int] = {}
@@ -190,6 +195,8 @@ class Hill:
             each.next_id = (each.next_id - 1 + round(self._turn(case.skipped_ids))) % 65535 + 1
             if case.at_miss:
                 each.busy_until = time + MS
+            each.loses = case.at_loss
+        self._delay = self._turn(case.delays_ms) * MS
         if case.stalls_ms:
             self._stalled_until = time + self._turn(case.stalls_ms) * MS
         if case.reboots:
@@ -216,7 +223,8 @@ class Hill:
                 continue
             camera.busy_until = time + _DEAD_NS
             number, camera.next_id = camera.next_id, camera.next_id % 65535 + 1
-            if (chance > 1 - case.lost and not quiet) or self._asleep(time):
+            if (chance > 1 - case.lost and not quiet) or self._asleep(time) or camera.loses:
+                camera.loses = False
                 continue
             came += 1
             self._send(camera, pulse, number, time)
@@ -225,7 +233,8 @@ class Hill:
 
     def _send(self, camera: _Camera, pulse: int, number: int, time: float) -> None:
         case, rng = self._case, self._rng
-        arrival = max(camera.last_arrival, time + rng.uniform(*case.latency_ms) * MS, self._stalled_until)
+        latency = rng.uniform(*case.latency_ms) * MS + self._delay
+        arrival = max(camera.last_arrival, time + latency, self._stalled_until)
         camera.last_arrival = arrival
         device = DeviceNs(camera.device(time + rng.random() * case.jitter_ms * MS) + camera.slip + camera.spike)
         camera.spike = 0

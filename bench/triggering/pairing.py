@@ -39,9 +39,12 @@ CASES: Final = (
     Case("clocks step back at a missed pulse", steps_ms=(-math.inf,), at_miss=True),
     Case("all clocks step together", steps_ms=(math.inf, -math.inf, 2.0), together=True),
     Case("single times are off", spikes_ms=(-math.inf, math.inf, -5.0, 16.0)),
+    Case("single times are off, behind a lost frame", spikes_ms=(-math.inf,), at_loss=True),
     Case("the computer stands still for 0.3 s", stalls_ms=(300.0,)),
     Case("the computer stands still, clocks step", stalls_ms=(300.0,), steps_ms=(math.inf, -math.inf)),
     Case("the computer stands still, times slip", stalls_ms=(300.0,), slips_ms=(-math.inf, math.inf), every_s=15.0),
+    Case("all frames come one period later", delays_ms=(math.inf, 0.0)),
+    Case("all frames come a little later, at 120 Hz", rates_hz=(120.0,), rate_hz=120.0, delays_ms=(8.0, 0.0)),
     Case("frame numbers skip", skipped_ids=(1, 2, 100)),
 )
 

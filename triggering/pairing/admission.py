@@ -1,15 +1,20 @@
 """Accepts the frames of all cameras, refuses them, or lets them wait until their trigger times can be judged."""
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from rig.clocks import HostNs
 from rig.frame import FrameRecord
+from triggering.pairing.camera.arrivals import LASTING
 from triggering.pairing.camera.plausibility import Verdict
 from triggering.pairing.camera.track import CameraTrack
 from triggering.pairing.held import HeldFrames
 from triggering.pairing.known_pulses import KnownPulses
 from triggering.pairing.other_cameras import OtherCameras
 from triggering.timeline.pulse_train import PulseTrain
+
+#: So many cameras at least have to show a change for it to be one of the link or the computer.
+_SEVERAL: Final = 2
 
 
 class Admission:
@@ -26,14 +31,17 @@ class Admission:
     """
 
     def __init__(self, tracks: Sequence[CameraTrack], pulses: KnownPulses, held: HeldFrames, train: PulseTrain) -> None:
-        self._tracks, self._held = tracks, held
+        self._tracks, self._held, self._train = tracks, held, train
         self._others = [OtherCameras(camera, tracks, pulses, held, train) for camera in range(len(tracks))]
 
     def admits(self, camera: int, record: FrameRecord, time: HostNs) -> bool:
         """Whether a frame that has just come, triggered at `time`, is accepted at once."""
         track = self._tracks[camera]
+        track.times.arrivals.heard(record.host_time - time)
         if len(self._tracks) == 1 or not track.times.plausibility.warm:
             return True
+        if track.times.plausibility.doubted:
+            self._believe_common_delay()
         if self._held.any_of(camera):
             return False
         return track.judge_new(record, time, self._others[camera]) is Verdict.ACCEPTED
@@ -59,6 +67,20 @@ class Admission:
         self._note_damage_behind(camera)
         for record in self._held.frames(camera):
             self._refuse(camera, record)
+
+    def _believe_common_delay(self) -> None:
+        """Learn all latencies anew if they have changed alike in all cameras: the link or the computer has changed.
+
+        Times that slip do so in one camera, and not in all of them at once.
+        """
+        there = [track.times for track in self._tracks if track.delivers and not track.silent]
+        changes = [change for times in there if (change := times.arrivals.change_ns) is not None]
+        since = [times.plausibility.doubted for times in there]
+        period = self._train.period_ns
+        at_once = len(changes) == len(there) >= _SEVERAL and min(since) > 0 and max(since) - min(since) <= LASTING
+        if at_once and min(map(abs, changes)) > period / 2 and max(changes) - min(changes) < period / 4:
+            for times in there:
+                times.learn_latencies_anew()
 
     def _settle(self, camera: int) -> Iterator[FrameRecord]:
         """Accept or refuse the frames of a camera that wait, as far as the evidence goes."""

@@ -22,7 +22,7 @@ NAMES = ["K1", "K2", "K3"]
 #: Triplets that each step, restart or suspension may cost: two frames show it, and those on their way are not used.
 COST = 4
 #: A step that only the next reading of the clock shows costs all frames until then, a quarter of a second. So does a
-#: time in which the computer takes no frames.
+#: time in which the computer takes no frames, and a link or a computer that has become slower.
 COST_LATE = 16
 #: A pulse is decided after so long, whatever waits: the hold, and as long as a frame may wait for its clock.
 MOST_OPEN_S = 1.3
@@ -68,7 +68,7 @@ def troubles_of(case: Case) -> int:
     """How many troubles come, one every four seconds."""
     rates = [1 / rate for rate in case.rates_hz]
     seconds = PULSES * sum(rates) / len(rates)
-    single = case.steps_ms or case.spikes_ms or case.stalls_ms or case.skipped_ids
+    single = case.steps_ms or case.spikes_ms or case.stalls_ms or case.skipped_ids or case.delays_ms
     return math.ceil(seconds / 4) if single or case.reboots or case.suspended else 0
 
 
@@ -92,7 +92,7 @@ def test_no_triplet_mixes_pulses_and_every_possible_one_is_found(case: Case, fau
     else:
         # The time of a single frame may be taken for that of a pulse beside the rhythm.
         assert result.invented <= troubles * bool(case.spikes_ms or case.together)
-        assert result.not_found <= troubles * (COST_LATE if case.stalls_ms or case.at_miss else COST)
+        assert result.not_found <= troubles * (COST_LATE if case.stalls_ms or case.at_miss or case.delays_ms else COST)
         assert case.reboots or found.unproven <= len(NAMES) * COST * (troubles + 1)
     asleep = len(NAMES) * troubles if case.suspended or case.skipped_ids or case.together else 0
     small = bool(case.steps_ms) and max(map(abs, case.steps_ms)) < LEAST_SEEN_MS

@@ -19,6 +19,8 @@ _RECENT: Final = 256
 _LEARN_EVERY: Final = 16
 #: The scatter of the latencies is known from so many frames on.
 _KNOWN: Final = 64
+#: A change of the latencies lasts if so many frames in a row show it.
+LASTING: Final = 8
 #: The median, and the quantile that lies one standard deviation below it: late frames are all above the median.
 _QUANTILES: Final = (0.16, 0.5)
 #: Least standard deviation of an arrival, ns: reading a clock and waking a process take so long.
@@ -77,16 +79,39 @@ class Arrivals:
 
     def __init__(self, train: PulseTrain) -> None:
         self._train = train
-        self.frames = 0
+        self.frames = self._learned = 0
         self.longest_ns = 0.0
         self._usual_ns, self._sigma_ns = 0.0, _LEAST_NS
         self._latencies: deque[int] = deque(maxlen=_RECENT)
+        self._heard: deque[int] = deque(maxlen=LASTING)
+
+    def forget(self) -> None:
+        """Learn the latencies anew: frames have another way, or another exposure."""
+        self._learned = 0
+        self._latencies.clear()
+        self._heard.clear()
+
+    def heard(self, latency_ns: int) -> None:
+        """Note the latency of a frame that has come, whether it will be accepted or not."""
+        self._heard.append(latency_ns)
+
+    @property
+    def change_ns(self) -> float | None:
+        """By how much the last few frames all came later than usual; None: by different times, or nobody knows."""
+        if (
+            self.scatter
+            or len(self._heard) < LASTING
+            or max(self._heard) - min(self._heard) > self._train.period_ns / 4
+        ):
+            return None
+        return sum(self._heard) / LASTING - self._usual_ns
 
     def add(self, latency_ns: int) -> None:
         """Enter the latency of an accepted frame."""
         self.frames += 1
+        self._learned += 1
         self._latencies.append(latency_ns)
-        if self.frames % _LEARN_EVERY == 0:
+        if self._learned % _LEARN_EVERY == 0:
             self._learn()
         longer = latency_ns - self.longest_ns
         self.longest_ns += longer if longer > 0 else _DECAY * longer
@@ -101,7 +126,7 @@ class Arrivals:
     @property
     def scatter(self) -> bool:
         """Whether arrivals scatter so widely that they cannot tell one pulse from the next, or may do so."""
-        return self.frames < _KNOWN or self._sigma_ns > self._train.period_ns / _PERIOD_TO_SIGMA
+        return self._learned < _KNOWN or self._sigma_ns > self._train.period_ns / _PERIOD_TO_SIGMA
 
     def is_usual(self, latency_ns: int) -> bool:
         """Whether a frame of this latency cannot be of a neighbouring pulse."""

@@ -51,8 +51,9 @@ class FrameTimes:
 
     def begin(self, *, clock_unknown: bool) -> None:
         """Begin an epoch; the first one keeps the readings of the clock so far."""
-        if clock_unknown:
+        if clock_unknown:  # exposure or region may be others now, and so the latencies
             self.clock = DeviceClock()
+            self.arrivals.forget()
         self.plausibility.doubted = 0
         self._confirmed = None
 
@@ -132,6 +133,11 @@ class FrameTimes:
             return Verdict.ACCEPTED
         timed = (_timed(before, record, time),)
         return self.plausibility.judge(last_time, timed, read=self._is_read(record), others=others)
+
+    def learn_latencies_anew(self) -> None:
+        """Believe the camera again: its frames come later or sooner than before, and nothing else is against it."""
+        self.arrivals.forget()
+        self.plausibility.doubted = 0
 
     def _is_read(self, record: FrameRecord) -> bool:
         """Whether the clock has been read after a frame, and goes on as it did."""

@@ -150,8 +150,11 @@ class Plausibility:
         """Whether arrivals confirm a group, its first frame too, which may be the last whose time was off."""
         if self._arrivals.scatter:
             return self._has_room(evidence)
-        first = self._arrivals.test([evidence.waiting[0].latency_ns])
-        return evidence.arrivals.confirms and first.shifted < _SHIFTED
+        return evidence.arrivals.confirms and self._is_first_sound(evidence)
+
+    def _is_first_sound(self, evidence: _Evidence) -> bool:
+        """Whether the first frame alone may have come as usual."""
+        return self._arrivals.test([evidence.waiting[0].latency_ns]).shifted < _SHIFTED
 
     def _judge_in_turn(self, evidence: _Evidence) -> Verdict:
         """Judge a frame that goes on from the last one in number and time, but did not come as usual."""
@@ -165,7 +168,8 @@ class Plausibility:
     def _judge_out_of_turn(self, evidence: _Evidence) -> Verdict:
         """Judge a frame that does not go on in number and time: of a pulse after missed ones, or beside the rhythm."""
         arrivals, several = evidence.arrivals, len(evidence.group) >= _SEVERAL
-        if arrivals.confirms:
+        # Frames behind it that came as usual confirm the rhythm, but not that the first one belongs to it.
+        if arrivals.confirms and self._is_first_sound(evidence):
             enough = True
         else:
             has_room = self._has_room(evidence)

@@ -12,7 +12,7 @@ result.
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from contextlib import AbstractContextManager, suppress
@@ -21,7 +21,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self, TypeVar
 
-from rig.api.recordings import Counts, Recording, SessionFields
+from rig.api.recordings import Counts, SessionFields
 from rig.api.status import State
 from rig.errors import (
     BadInputError,
@@ -39,12 +39,13 @@ from rig.transport.recorder_commands import RecorderOptions, StartRecording
 from rig.transport.recorder_reports import RecordingFinished
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
+from service.processes.rig_processes import CameraPresence
 from service.processes.rig_session import StartHill
 from service.recordings.in_progress import Outcome
 from service.recordings.storage import check_room_for
 from service.status.event_hub import EventHub
-from service.supervision.commands import at_once
-from service.supervision.picture import WarmUp
+from service.supervision.messages import Arm, Begin, Close, Command
+from service.supervision.situation import Situation
 from service.supervision.supervisor import Supervisor
 from triggering.sources.choice import trigger_source
 
@@ -97,7 +98,7 @@ class HeadlessRig:
     def __enter__(self) -> Self:
         self._supervisor.start()
         try:
-            self._ask(at_once(self._supervisor.arm))
+            self._ask(Arm)
         except BaseException:
             self.__exit__(None, None, None)
             raise
@@ -138,17 +139,18 @@ class HeadlessRig:
         settle_s = self._rig.trigger.settle_s
         while True:
             heed(asks)
-            seen = self._ask(at_once(self._supervisor.look))
-            if seen.warm and seen.state is State.ARMED:
+            now = self._look()
+            state, seen = now.state, now.seen
+            if seen.warm and state is State.ARMED:
                 self._tell_absent()
                 return
-            now = time.monotonic()
+            fault, moment = now.fault.statement, time.monotonic()
             if seen.cameras is None:
-                began = now  # the simulated hill and the processes are still being started
-            elif seen.fault is not None and seen.fault.code == "fault_wrong_rate":
-                raise BadInputError(f"{seen.fault.text}: {seen.fault.advice}")
+                began = moment  # the simulated hill and the processes are still being started
+            elif state is State.FAULT and fault is not None and fault.code == "fault_wrong_rate":
+                raise BadInputError(f"{fault.text}: {fault.advice}")
             elif all(camera.present for camera in seen.cameras):
-                if now > complete_since + settle_s:
+                if moment > complete_since + settle_s:
                     raise CameraError(
                         f"all cameras are ready, but no complete triplet came within {settle_s:g} s: "
                         f"{trigger_source(self._rig.trigger).advice}"
@@ -156,13 +158,13 @@ class HeadlessRig:
                 time.sleep(_POLL_S)
                 continue
             # A camera that failed to answer gets `settle_s`; one whose process is still starting gets longer.
-            elif now > began + (settle_s if all(camera.tried for camera in seen.cameras) else _ANSWER_S):
+            elif moment > began + (settle_s if all(camera.tried for camera in seen.cameras) else _ANSWER_S):
                 if sum(camera.present for camera in seen.cameras) < self._rig.least_cameras:
-                    self._raise_absent(seen)
-                if seen.state is State.ARMED:
+                    self._raise_absent(seen.cameras)
+                if state is State.ARMED:
                     self._tell_absent()
                     return
-            complete_since = now
+            complete_since = moment
             time.sleep(_POLL_S)
 
     def _tell_absent(self) -> None:
@@ -185,11 +187,8 @@ class HeadlessRig:
         """
         order = StartRecording(path=path, session=session, pulses=pulses, seconds=seconds)
         self._path, self._ended = path, Future()
-
-        def start(opened: "Future[Recording]") -> None:
-            self._supervisor.recordings.begin(order, SessionFields(), opened, self._ended)
-
-        begun = self._ask(start)  # under another name, if another program has taken this one meanwhile
+        begin = partial(Begin, start=order, session=SessionFields(), ended=self._ended)
+        begun = self._ask(begin)  # under another name, if another program has taken this one meanwhile
         self._path = path.with_name(f"{begun.id}{path.suffix}")
 
     def stop_recording(self, *, wait_for_disk: bool = True) -> None:
@@ -199,7 +198,7 @@ class HeadlessRig:
             wait_for_disk: False: give up what the disk has not taken.
         """
         with suppress(UnknownRecordingError):
-            self._ask(at_once(partial(self._supervisor.recordings.stop, at_once=not wait_for_disk)))
+            self._ask(partial(Close, at_once=not wait_for_disk))
 
     def wait_until_finished(self, on_progress: Callable[[Counts], None], stop: Asks) -> RecordingFinished:
         """Wait for the end of the recording.
@@ -238,16 +237,23 @@ class HeadlessRig:
         while self._supervisor.truths.busy and stop() == asked:
             self._supervisor.truths.wait(_POLL_S)
 
-    def _ask(self, command: Callable[["Future[T]"], None]) -> T:
-        """Have the supervisor carry out a command; if it has ended, raise the error that ended it."""
+    def _ask(self, make: "Callable[[Future[T]], Command[T]]") -> T:
+        """Give the supervisor a command; if it has ended, raise the error that ended it."""
         try:
-            return self._supervisor.commands.ask(command, _ANSWER_S)
+            return self._supervisor.ask(make, _ANSWER_S)
         except ProcessDiedError as error:
-            raise self._supervisor.failure or error from None
+            raise self._supervisor.now.loop.failure or error from None
 
-    def _raise_absent(self, seen: WarmUp) -> None:
+    def _look(self) -> Situation:
+        """The situation; if an error has ended the supervisor, raise it."""
+        now = self._supervisor.now
+        if now.loop.failure is not None:
+            raise now.loop.failure
+        return now
+
+    def _raise_absent(self, cameras: Sequence[CameraPresence]) -> None:
         told: dict[str, list[str]] = {}  # by the remedy, which may be the same for all
-        for camera, heard in zip(self._rig.cameras, seen.cameras or (), strict=True):
+        for camera, heard in zip(self._rig.cameras, cameras, strict=True):
             if not heard.present:
                 said = heard.said.text or (
                     f"camera {camera.name} at {camera.address} does not answer: check power, cable and address"
@@ -255,7 +261,7 @@ class HeadlessRig:
                 what, _, remedy = said.partition(": ")
                 told.setdefault(remedy, []).append(what)
         reasons = "; ".join(": ".join(filter(None, (", ".join(what), remedy))) for remedy, what in told.items())
-        present = sum(heard.present for heard in seen.cameras or ())
+        present = sum(heard.present for heard in cameras)
         without = f"; to record without, set min_cameras = {present} under [trigger] in the rig file" if present else ""
         raise CameraNotFoundError(reasons + without)
 

@@ -1,5 +1,6 @@
 """Exposure, gain and region of the cameras, changed while the rig runs and kept in the rig file on request."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -11,8 +12,7 @@ from rig.settings.camera import CameraSettings
 from rig.settings.light import camera_of, with_light, written
 from service.regions import Regions, unfit
 from service.rig_file import keep
-from service.supervision.commands import at_once
-from service.supervision.settings_control import RigInUse
+from service.supervision.messages import ChangeCamera
 from service.supervision.supervisor import Supervisor
 
 _SOON_S: Final = 10.0
@@ -60,15 +60,15 @@ class Lights:
             StorageError: the rig file cannot be written; the camera has what was changed all the same.
         """
         with self._supervisor.changing:
-            supervisor, before = self._supervisor, self.view(name)
-            rig = with_light(supervisor.rig, name, change.values())
+            supervisor, in_use, before = self._supervisor, self._supervisor.now.in_use, self.view(name)
+            rig = with_light(in_use.rig, name, change.values())
             exposure_us, gain_db = _light(camera_of(rig, name))
-            new = RigInUse(rig, written(supervisor.rig_toml, name, change.values()))
+            new = replace(in_use, rig=rig, toml=written(in_use.toml, name, change.values()))
             lit = (exposure_us, gain_db) != (before.exposure_us, before.gain_db)
             if change.region is not None and change.region.region() != before.region:
                 self._regions.change(name, change.region.region(), new)
             elif lit:
-                supervisor.commands.ask(at_once(partial(supervisor.settings.change_camera, new, name)), _SOON_S)
+                supervisor.ask(partial(ChangeCamera, new=new, camera=name), _SOON_S)
             if lit:
                 said = phrase(
                     "event_light", "exposes for {exposure_us:g} us now, with a gain of {gain_db:g} dB",

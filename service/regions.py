@@ -1,6 +1,7 @@
 """The regions of the sensors that cameras read out, changed while the rig runs and kept in the rig file on request."""
 
-from concurrent.futures import Future
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +16,8 @@ from rig.settings.region import RegionLimits, calibration_unfit, named, with_reg
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.rig_file import keep
-from service.supervision.settings_control import RigInUse
+from service.supervision.messages import ChangeRegion
+from service.supervision.situation import RigInUse
 from service.supervision.supervisor import Supervisor
 
 #: Cameras have 20 s to answer at arming, and the first triplets 10 s more.
@@ -41,7 +43,7 @@ class Regions:
 
     def limits(self, name: str) -> RegionLimits | None:
         """Which regions a camera takes; None: it was not connected yet, or does not say."""
-        return self._supervisor.limits.get(name)
+        return self._supervisor.now.heard.limits.get(name)
 
     def change(self, name: str, region: Region, also: RigInUse) -> None:
         """Read out another region of a camera's sensor; returns when the rig is armed with it, or at once if it is not.
@@ -60,19 +62,14 @@ class Regions:
             StateForbidsError: a recording runs, or the rig is being armed or disarmed.
         """
         supervisor = self._supervisor
-        before = RigInUse(supervisor.rig, supervisor.rig_toml)
         rig = with_region(also.rig, name, region)
         camera = camera_of(rig, name)
         if (limits := self.limits(name)) is not None and not (camera.backend == "iidc" and is_fixed_format(camera)):
             limits.check(name, region)
         check_backends(rig)
         check_memory(rig, self._preroll_s)
-        new = RigInUse(rig, written_region(also.toml, name, region, camera.calibrated_region))
-
-        def use(answer: "Future[None]") -> None:
-            supervisor.settings.change_region(before, new, name, answer)
-
-        supervisor.commands.ask(use, _TRIED_S)
+        new = replace(also, rig=rig, toml=written_region(also.toml, name, region, camera.calibrated_region))
+        supervisor.ask(partial(ChangeRegion, new=new, camera=name), _TRIED_S)
         said = phrase("event_region", "reads out {region} now", region=named(region))
         supervisor.hub.tell(Event.now(Level.INFO, name, said))
         if (why := calibration_unfit(camera)) is not None:

@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
 from typing import Final, Literal
@@ -41,7 +40,6 @@ from service.lights import Lights
 from service.measuring.queue import Measurings
 from service.recordings.archive import Archive
 from service.recordings.describing import as_recording
-from service.recordings.in_progress import Outcome
 from service.recordings.measured_jumps import MeasuredJumps
 from service.recordings.trash_keeper import TrashKeeper
 from service.rehearsals import Rehearser
@@ -49,7 +47,7 @@ from service.seam.cameras import CloseUp, Preview
 from service.status.forbidden import FORBIDDEN
 from service.status.measurements import measurements
 from service.status.statements import rehearsing
-from service.supervision.commands import at_once
+from service.supervision.messages import Acknowledge, Arm, ChangeSession, Disarm, Start, Stop
 from service.supervision.supervisor import Supervisor
 from service.trains import Trains
 
@@ -137,11 +135,11 @@ class Service(Archive):
             return self._begin_to_arm(order)
 
     def _begin_to_arm(self, order: ArmOrder) -> Status:
-        return self._supervisor.commands.ask(at_once(partial(self._supervisor.arm, order.min_cameras)), _SOON_S)
+        return self._supervisor.ask(partial(Arm, min_cameras=order.min_cameras), _SOON_S)
 
     def acknowledge(self, alarm: int) -> Status:
         """Note that somebody has seen an alarm."""
-        self._supervisor.commands.ask(at_once(partial(self._supervisor.acknowledge, alarm)), _SOON_S)
+        self._supervisor.ask(partial(Acknowledge, alarm=alarm), _SOON_S)
         return self.status()
 
     def rehearsals(self) -> Rehearsals:
@@ -171,7 +169,7 @@ class Service(Archive):
 
     def disarm(self) -> Status:
         """Begin to disarm."""
-        return self._supervisor.commands.ask(at_once(self._supervisor.disarm), _SOON_S)
+        return self._supervisor.ask(Disarm, _SOON_S)
 
     def start_recording(self, order: RecordingOrder) -> Recording:
         """Start; returns when the log is open. What lies in the trash makes room for it if it must."""
@@ -185,12 +183,7 @@ class Service(Archive):
         if status.state is State.ARMED:
             self.exports.tidy()
             self._keeper.make_room(supervisor.rig.recorder.jump_s if order.duration_s is None else order.duration_s)
-
-        def start(opened: "Future[Recording]") -> None:
-            supervisor.recordings.start(order, opened)
-            supervisor.train.needed(order)
-
-        return supervisor.commands.ask(start, _OPEN_S)
+        return supervisor.ask(partial(Start, order=order), _OPEN_S)
 
     def mark(self, mark: JumpMark) -> Marked:
         """Begin a recording at the mark, with the seconds before; one that runs already only gets the mark."""
@@ -209,12 +202,8 @@ class Service(Archive):
     def stop_recording(self, recording_id: str, order: StopOrder) -> Recording:
         """Stop, and return when the log is closed."""
         supervisor = self._supervisor
-
-        def stop(ended: "Future[Outcome]") -> None:
-            supervisor.recordings.stop(recording_id, ended, order=order)
-
         with suppress(UnknownRecordingError):  # not in progress: it is over, or the catalogue does not know it either
-            supervisor.commands.ask(stop, _CLOSE_S)
+            supervisor.ask(partial(Stop, recording=recording_id, order=order), _CLOSE_S)
             supervisor.truths.wait(_SOON_S)
         return as_recording(self._catalogue.entry(recording_id))
 
@@ -222,17 +211,13 @@ class Service(Archive):
         """Change session fields, also of the recording in progress."""
         entry = self._catalogue.change_session(recording_id, change.texts())
         self._measurings.renamed(recording_id, self._catalogue.file(recording_id))
-        note = partial(self._supervisor.recordings.change_session, recording_id, change.fields())
-        return self._supervisor.commands.ask(at_once(note), _SOON_S) or self._with_next_part(entry)
+        note = partial(ChangeSession, recording=recording_id, change=change.fields())
+        return self._supervisor.ask(note, _SOON_S) or self._with_next_part(entry)
 
     def delete_recording(self, recording_id: str) -> Recording:
         """Put a recording into the trash."""
-        recordings = self._supervisor.recordings
-
-        def in_progress() -> bool:
-            return recordings.current is not None and recordings.current.id == recording_id
-
-        if self._supervisor.commands.ask(at_once(in_progress), _SOON_S):
+        current = self._supervisor.now.recordings.current
+        if current is not None and current.id == recording_id:
             raise StateForbidsError(
                 phrase(
                     "recording_in_progress",
@@ -342,8 +327,9 @@ class Service(Archive):
 
     def rig(self) -> RigView:
         """The rig file in use."""
-        rig = self._supervisor.rig
-        return RigView(name=rig.name, toml=self._supervisor.rig_toml, settings=rig.model_dump(mode="json"))
+        in_use = self._supervisor.now.in_use
+        rig = in_use.rig
+        return RigView(name=rig.name, toml=in_use.toml, settings=rig.model_dump(mode="json"))
 
     def doctor(self) -> DoctorReport:
         """Run the doctor, except for probes that would disturb the present state."""
@@ -352,7 +338,7 @@ class Service(Archive):
 
     def metrics(self) -> Iterable[Metric]:
         """The metric families of what has been measured so far."""
-        return measurements(self.status(), self._supervisor.health)
+        return measurements(self.status(), self._supervisor.now.seen.health)
 
     def healthy(self) -> bool:
         """Whether the loop turns and the recorder answers."""

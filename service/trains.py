@@ -1,6 +1,6 @@
 """The train of pulses, where svev makes it: stopped and started while armed, at another rate, kept in the rig file."""
 
-from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -16,8 +16,7 @@ from rig.settings.rate import with_rate, written_rate
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.rig_file import keep
-from service.supervision.commands import at_once
-from service.supervision.settings_control import RigInUse
+from service.supervision.messages import Burst, ChangeRate, RunTrain
 from service.supervision.supervisor import Supervisor
 from triggering.sources.choice import trigger_source
 
@@ -60,7 +59,7 @@ class Trains:
             self._check_made_here(TriggerControl.RATE)
             if change.running is not None:
                 self._check_made_here(TriggerControl.RUNNING)
-                self._ask(partial(self._supervisor.train.run, running=change.running))
+                self._supervisor.ask(partial(RunTrain, running=change.running), _SOON_S)
             if change.rate_hz is not None and change.rate_hz != self._supervisor.rig.trigger.rate_hz:
                 self._change_rate(change.rate_hz)
             if change.save:
@@ -75,11 +74,8 @@ class Trains:
         """
         with self._supervisor.changing:
             self._check_made_here(TriggerControl.RUNNING)
-            self._ask(partial(self._supervisor.train.burst, pulses))
+            self._supervisor.ask(partial(Burst, pulses=pulses), _SOON_S)
             return self.view()
-
-    def _ask(self, command: Callable[[], None]) -> None:
-        self._supervisor.commands.ask(at_once(command), _SOON_S)
 
     def _check_made_here(self, control: TriggerControl) -> None:
         rig = self._supervisor.rig
@@ -110,13 +106,14 @@ class Trains:
 
     def _change_rate(self, rate_hz: float) -> None:
         supervisor = self._supervisor
-        rig = with_rate(supervisor.rig, rate_hz)
+        in_use = supervisor.now.in_use
+        rig = with_rate(in_use.rig, rate_hz)
         trigger_source(rig.trigger)
         check_backends(rig)
         _check_dead_time(rig)
         check_memory(rig, self._preroll_s)
-        text = written_rate(supervisor.rig_toml, rate_hz)
-        self._ask(partial(supervisor.settings.change_rate, RigInUse(rig, text)))
+        new = replace(in_use, rig=rig, toml=written_rate(in_use.toml, rate_hz))
+        supervisor.ask(partial(ChangeRate, new=new), _SOON_S)
         said = phrase("event_rate", "is to make {rate_hz:g} pulses per second from now on", rate_hz=rate_hz)
         supervisor.hub.tell(Event.now(Level.INFO, TRIGGER, said))
 

@@ -196,6 +196,7 @@ class ProcessTable:
         return left
 
 
+@dataclass(frozen=True, slots=True)
 class BackOff:
     """How long to wait before a dead child is started again.
 
@@ -203,26 +204,17 @@ class BackOff:
 
     Attributes:
         deaths: number of deaths so far.
+        wait_s: how long to wait after the last one, s.
     """
 
-    def __init__(self) -> None:
-        self.deaths = 0
-        self._wait_s = 0.0
+    deaths: int = 0
+    wait_s: float = 0.0
 
-    def died(self, lived_s: float) -> float:
-        """Enter a death.
+    def died(self, lived_s: float) -> "BackOff":
+        """After another death of a child that had run for so long, s."""
+        fresh = lived_s >= _GOOD_S or not self.wait_s
+        return BackOff(self.deaths + 1, _FIRST_WAIT_S if fresh else min(_LONGEST_WAIT_S, 2 * self.wait_s))
 
-        Args:
-            lived_s: how long the child had run, s.
-
-        Returns:
-            Seconds to wait from now on before it is started again.
-        """
-        self.deaths += 1
-        fresh = lived_s >= _GOOD_S or not self._wait_s
-        self._wait_s = _FIRST_WAIT_S if fresh else min(_LONGEST_WAIT_S, 2 * self._wait_s)
-        return self._wait_s
-
-    def forget(self) -> None:
-        """Begin with one second again, because a person has seen to the cause."""
-        self._wait_s = 0.0
+    def forgotten(self) -> "BackOff":
+        """It begins with one second again, because a person has seen to the cause."""
+        return BackOff(self.deaths)

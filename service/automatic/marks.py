@@ -15,7 +15,7 @@ from rig.phrase import Phrase, phrase
 from rig.transport.preview import PreviewSlot
 from service.automatic.barrier import BarrierWatch
 from service.automatic.watch import MotionWatch
-from service.supervision.commands import at_once
+from service.supervision.messages import MotionSeen, NotBegun, Note
 from service.supervision.supervisor import Supervisor
 
 _NOTED_S: Final = 10.0
@@ -73,8 +73,7 @@ class Marks:
         age_s = _age_s(mark)
         source, age = mark.source or "?", f"{age_s:.1f}"
         said = phrase("event_marked", "a jump is marked by {source}, {age} s ago", source=source, age=age)
-        note = partial(self._supervisor.note, Event.now(Level.INFO, "mark", said))
-        self._supervisor.commands.ask(at_once(note), _NOTED_S)
+        self._supervisor.ask(partial(Note, event=Event.now(Level.INFO, "mark", said)), _NOTED_S)
         if (running := self._status().recording) is not None:
             return Marked(started=False, recording=running)
         settings = self._settings
@@ -120,7 +119,7 @@ class Marks:
             if self._motion is not None and self._motion.on:
                 self.mark(_mark("motion", time))
                 return
-            self._supervisor.commands.ask(at_once(self._supervisor.board.moved), _NOTED_S)
+            self._supervisor.ask(MotionSeen, _NOTED_S)
         except SvevError as error:
             self._not_begun("motion", error.said)
 
@@ -134,7 +133,7 @@ class Marks:
     def _not_begun(self, name: str, why: Phrase) -> None:
         """Say that a jump came and no recording could begin: an alarm, until the next one begins."""
         try:
-            self._supervisor.commands.ask(at_once(partial(self._supervisor.board.not_begun, why)), _NOTED_S)
+            self._supervisor.ask(partial(NotBegun, why=why), _NOTED_S)
         except SvevError:  # the service ends, or does not answer: then the log alone can say it
             self._tell(Level.WARNING, name, phrase("event_unrecorded", "no recording could begin: {why}", why=why))
 

@@ -11,8 +11,8 @@ from rig.phrase import Phrase, phrase
 from rig.settings.calibration import with_calibration, written_calibration
 from service.recordings.calibration import read_calibration
 from service.rig_file import keep
-from service.supervision.commands import at_once
-from service.supervision.settings_control import RigInUse
+from service.supervision.messages import ChangeCalibration
+from service.supervision.situation import RigInUse
 from service.supervision.supervisor import Supervisor
 
 _SOON_S: Final = 10.0
@@ -48,9 +48,9 @@ class CalibrationKeeper:
             cameras &= {camera.name for camera in supervisor.rig.cameras}
             file = self._with_others(result, cameras).resolve()
             rig = with_calibration(supervisor.rig, file, cameras)
-            known = read_calibration(rig)
-            new = RigInUse(rig, written_calibration(supervisor.rig_toml, file, cameras))
-            supervisor.commands.ask(at_once(partial(supervisor.settings.change_calibration, new, known)), _SOON_S)
+            text = written_calibration(supervisor.now.in_use.toml, file, cameras)
+            new = RigInUse(rig, text, read_calibration(rig))
+            supervisor.ask(partial(ChangeCalibration, new=new), _SOON_S)
             said = phrase("event_calibration", "is {file} from now on", file=str(file))
             supervisor.hub.tell(Event.now(Level.INFO, "calibration", said))
 

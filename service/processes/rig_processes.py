@@ -305,7 +305,8 @@ class RigProcesses:
                 reason = phrase("why_process_ended", "process ended ({how})", how=how)
             else:
                 reason = phrase("why_grabber_ended", "grabber process ended ({how})", how=how)
-            wait_s = self._back_offs[name].died(now - child.started)
+            back_off = self._back_offs[name] = self._back_offs[name].died(now - child.started)
+            wait_s = back_off.wait_s
             self._again[child] = now + wait_s
             text = "{why}; starting it again in {seconds:g} s"
             said = phrase("event_process_again", text, why=reason, seconds=wait_s)

@@ -1,8 +1,9 @@
 """A recording whose recorder died: reads what its log holds, so that a new recorder goes on with the next number."""
 
 import threading
-import time
+from collections.abc import Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +16,7 @@ from rig.errors import SvevError
 from rig.transport.recorder_commands import GoesOn, StartRecording
 
 #: A disk from which the log is not read within this time hangs.
-_READ_S: Final = 10.0
+READ_S: Final = 10.0
 #: A recorder that dies so often within so many seconds would die again.
 DEATHS_MAX: Final = 3
 DEATHS_WITHIN_S: Final = 60.0
@@ -23,64 +24,83 @@ DEATHS_WITHIN_S: Final = 60.0
 _RATE_PULSES: Final = 10
 
 
-class Interruption:
-    """The time from the death of a recorder until a new one goes on. The log is read in a thread of its own.
-
-    Args:
-        log: the last log of the dead recorder.
-        error: how it died.
+@dataclass(frozen=True, slots=True)
+class FoundLog:
+    """The log of a dead recorder.
 
     Attributes:
-        error: as given.
+        log: what it holds.
+        next: path of the log in which the recording goes on.
+    """
+
+    log: LogInfo
+    next: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Interruption:
+    """The time from the death of a recorder until a new one goes on.
+
+    Attributes:
+        error: how it died.
+        until: a log that is not read until then is on a disk that hangs; on the monotonic clock, s.
+        read: whether the log is read, or cannot be.
+        found: what it holds; None: it is not read, or cannot be.
         resumed: whether a new recorder has been told to go on.
     """
 
-    def __init__(self, log: Path, error: SvevError) -> None:
-        self.error, self.resumed = error, False
-        self._log, self._until = log, time.monotonic() + _READ_S
-        self._found: Future[LogInfo] = Future()
-        # Never keeps the process alive: the disk may hang for ever.
-        threading.Thread(target=self._read, name="reads a log", daemon=True).start()
+    error: SvevError
+    until: float
+    read: bool = False
+    found: FoundLog | None = None
+    resumed: bool = False
 
-    @property
-    def over(self) -> bool:
-        """Whether the log is read, or cannot be."""
-        return self._found.done() or time.monotonic() > self._until
+    def over(self, now: float) -> bool:
+        """Whether it is known at a moment, on the monotonic clock, s, with which pulse the recording goes on."""
+        return self.read or now > self.until
 
-    def found(self) -> LogInfo | None:
-        """What the log holds; None if it cannot be read."""
-        return self._found.result() if self._found.done() and self._found.exception() is None else None
 
-    def _read(self) -> None:
+def begin_to_read(log: Path, first_id: str) -> "Future[FoundLog]":
+    """Read a log in a thread of its own, which never keeps the process alive: the disk may hang for ever.
+
+    Args:
+        log: the last log of a dead recorder.
+        first_id: id of the recording's first log, after which all others are named.
+    """
+    found: Future[FoundLog] = Future()
+
+    def read() -> None:
         try:
-            self._found.set_result(info(self._log, original=True))
+            held = info(log, original=True)
+            found.set_result(FoundLog(held, _next_path(log.parent, first_id, log.suffix)))
         except Exception as error:  # noqa: BLE001 - whatever is odd about the log, the recording ends then
-            self._found.set_exception(error)
+            found.set_exception(error)
+
+    threading.Thread(target=read, name="reads a log", daemon=True).start()
+    return found
 
 
-def died_too_often(deaths: list[float]) -> bool:
+def died_too_often(deaths: Sequence[float], now: float) -> bool:
     """Whether a recorder that died at these times, on the monotonic clock, s, is not to be trusted any more."""
-    now = time.monotonic()
     return sum(now - death < DEATHS_WITHIN_S for death in deaths) >= DEATHS_MAX
 
 
 def going_on(
-    order: StartRecording, session: SessionFields, log: LogInfo, first_id: str, commanded: HostNs, period_ns: float
+    order: StartRecording, session: SessionFields, found: FoundLog, commanded: HostNs, period_ns: float
 ) -> StartRecording:
     """The order for a log that continues another one.
 
     Args:
         order: that for the other one.
         session: the session fields, as they are now.
-        log: what the other log holds.
-        first_id: id of the recording's first log, after which all others are named.
+        found: the other log.
         commanded: when the recording was started.
         period_ns: nominal time between two pulses.
     """
-    ledger = log.ledger
+    ledger = found.log.ledger
     measured = ledger.pulses >= _RATE_PULSES and ledger.rate_hz is not None
     before = GoesOn(
-        recording=log.path.stem,
+        recording=found.log.path.stem,
         commanded=commanded,
         pulse=ledger.last_pulse,
         time=ledger.last_time,
@@ -88,9 +108,7 @@ def going_on(
     )
     others = {name: text for name, text in order.session.items() if name not in SessionFields.model_fields}
     fields = {name: text for name, text in session.model_dump().items() if text}
-    return msgspec.structs.replace(
-        order, path=_next_path(log.path.parent, first_id, log.path.suffix), session=others | fields, goes_on=before
-    )
+    return msgspec.structs.replace(order, path=found.next, session=others | fields, goes_on=before)
 
 
 def _next_path(folder: Path, first_id: str, suffix: str) -> Path:

@@ -3,46 +3,47 @@
 import os
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from rig.errors import ProcessDiedError
+from service.supervision.messages import Command, End, Message
 
 T = TypeVar("T")
 
 
 class Commands:
-    """A queue of commands, with a bell that wakes the thread that carries them out (the owner).
+    """A queue of messages, with a bell that wakes the thread that takes them (the owner).
 
     Attributes:
-        bell: descriptor that becomes readable when there is a command; for the owner's `select`.
+        bell: descriptor that becomes readable when there is a message; for the owner's `select`.
     """
 
     def __init__(self) -> None:
         self.bell = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
-        self._queue: queue.SimpleQueue[tuple[Callable[[Future[Any]], None], Future[Any]]] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._over = False
 
-    def ask(self, command: Callable[["Future[T]"], None], deadline_s: float) -> T:
-        """Have the owner carry out a command, and wait for the answer.
+    def ask(self, make: "Callable[[Future[T]], Command[T]]", deadline_s: float) -> T:
+        """Give the owner a command, and wait for the answer.
 
         Args:
-            command: called in the owner's thread; sets the result or error of its future, now or later.
+            make: makes the command of who waits for its answer.
             deadline_s: longest time to wait, s.
 
         Raises:
-            ProcessDiedError: no answer came in time; the command may still be carried out.
-            SvevError: the error that the command raised or set.
+            ProcessDiedError: no answer came in time; the command may still be obeyed.
+            SvevError: why it cannot be obeyed.
         """
         future: Future[T] = Future()
         with self._lock:
             if self._over:
                 raise _ending()
-            self._queue.put((command, future))
+            self._queue.put(make(future))
             self.ring()
         try:
             return future.result(deadline_s)
@@ -51,38 +52,34 @@ class Commands:
                 f"the service did not get it done within {deadline_s:g} s: look at its state, and try again"
             ) from None
 
+    def end_by(self, moment: float) -> None:
+        """Tell the owner to end, at the latest at a moment on the monotonic clock, s; also from a signal handler."""
+        self._queue.put(End(moment))
+        self.ring()
+
     def ring(self) -> None:
         """Wake the owner. May be called from a signal handler."""
         os.eventfd_write(self.bell, 1)
 
-    def carry_out(self) -> None:
-        """Carry out all commands in the queue; called by the owner."""
+    def fetch(self) -> Iterator[Message]:
+        """All messages in the queue; for the owner."""
         with suppress(BlockingIOError):  # the bell has not rung
             os.eventfd_read(self.bell)
         with suppress(queue.Empty):
             while True:
-                command, future = self._queue.get_nowait()
-                try:
-                    command(future)
-                except Exception as error:  # noqa: BLE001 - any error is the answer; the owner goes on
-                    future.set_exception(error)
+                yield self._queue.get_nowait()
 
     def end(self) -> None:
         """Refuse all commands from now on, and those that are still in the queue."""
         with self._lock:
             self._over = True
-        with suppress(queue.Empty):
-            while True:
-                self._queue.get_nowait()[1].set_exception(_ending())
+        for message in self.fetch():
+            if isinstance(message, Command):
+                message.answer.set_exception(_ending())
 
     def close(self) -> None:
         """Close the bell; call it after `end`."""
         os.close(self.bell)
-
-
-def at_once(function: Callable[[], T]) -> Callable[["Future[T]"], None]:
-    """A command whose answer is what `function` returns in the owner's thread."""
-    return lambda answer: answer.set_result(function())
 
 
 def _ending() -> ProcessDiedError:

@@ -1,6 +1,6 @@
-"""One moment's picture of the service for the panel, from what the supervisor knows."""
+"""The status for the panel, derived from the situation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Final
@@ -9,11 +9,12 @@ import msgspec
 
 from rig.action import ActionCounts
 from rig.api.jump import LastJump
-from rig.api.recordings import NextJumper, Recording
+from rig.api.recordings import NextJumper
 from rig.api.statement import Level, Statement
 from rig.api.status import (
     ActionAnswers,
     Alarm,
+    CameraState,
     CameraStatus,
     DiskStatus,
     MadePulses,
@@ -24,13 +25,11 @@ from rig.api.status import (
     Status,
 )
 from rig.health import Health, PulsesMade
-from rig.settings.model import RigSettings
-from service.processes.rig_processes import CameraPresence
-from service.recordings.storage import Room
+from service.processes.rig_processes import RECORDER, CameraPresence
+from service.recordings.storage import room_for
 from service.status.statements import about_camera, about_state, camera_state, pairing_alarm, process_restarted
-from service.supervision.state_machine import Phase
+from service.supervision.situation import Moment, Situation
 from service.supervision.tap_guard import tap_guard
-from service.supervision.watching import PulseRate
 from triggering.alarms.notices import set_up_only
 from triggering.sources.choice import trigger_source
 
@@ -42,137 +41,111 @@ _VERSION: Final = version("svev")
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
-    """What the supervisor knows at one moment.
+class Beside:
+    """What the status shows beside the situation.
 
     Attributes:
-        phase: the state and its beginning.
-        fault: the fault in words; None in any other state.
-        notice: what befell the last recording.
-        heard: what was last heard of each camera; None while nothing runs.
-        health: the recorder's last health record, None if there is none.
-        warm: whether whole triplets have come.
-        pulses: rate of the pulses.
-        still: whether pulses are made on request only.
+        at: the present moment.
         alarms: what is wrong with pulses, clocks and cameras.
         overloaded: indices of the cameras whose frames come late or get lost because the computer is too slow.
-        room: on the disk.
+        free_bytes: on the disk.
         preroll_s: what is to be held in memory.
-        holding_s: for how long the present past has been held, s; the health record may be of before.
-        pids: process ids by row of the process table.
-        restarts: how often each row was started again.
+        last_jump: the jump that was measured last.
+        next_jumper: whom the next recording is of.
     """
 
-    phase: Phase
-    fault: Statement | None
-    notice: Statement | None
-    heard: Sequence[CameraPresence] | None
-    health: Health | None
-    warm: bool
-    pulses: PulseRate
-    still: bool
+    at: Moment
     alarms: tuple[Alarm, ...]
     overloaded: Sequence[int]
-    room: Room
+    free_bytes: int
     preroll_s: float
-    holding_s: float
-    recording: Recording | None
-    last_recording: str | None
     last_jump: LastJump | None
     next_jumper: NextJumper
-    pids: dict[str, int]
-    restarts: dict[str, int]
 
 
-@dataclass(frozen=True, slots=True)
-class WarmUp:
-    """How far a rig has come since it was armed, for a command that waits for it.
-
-    Attributes:
-        state: the state of the service.
-        cameras: presence of each camera; None while there are no processes.
-        warm: whether complete triplets have come.
-        fault: why the rig is not armed; None in any other state.
-    """
-
-    state: State
-    cameras: tuple[CameraPresence, ...] | None
-    warm: bool
-    fault: Statement | None
-
-
-def picture(rig: RigSettings, facts: Facts) -> Status:
+def picture(now: Situation, beside: Beside) -> Status:
     """The status for the panel."""
-    cameras = _cameras(rig, facts)
-    states = [camera.state for camera in cameras]
-    state, pulses = facts.phase.state, facts.pulses
-    arriving = facts.heard is not None and (pulses.arriving or (facts.warm and not facts.health))
+    rig, seen, current = now.in_use.rig, now.seen, now.recordings.current
+    cameras, pulses = _cameras(now, beside), now.heard.pulses
+    arriving = seen.cameras is not None and (pulses.arriving or (seen.warm and not seen.health))
     rate = pulses.rate_hz if arriving else None
-    if state is not State.FAULT:
-        made = None if facts.health is None else facts.health.made
-        closed = made is not None and made.gate_open is False
-        statement = about_state(
-            state, rig.cameras, states, arriving, rate, facts.overloaded, still=facts.still, gate_closed=closed
-        )
-        if facts.notice is not None and statement.level is Level.GOOD:  # what is wrong now matters more than what was
-            statement = facts.notice
-        if statement.level is Level.GOOD and (wrong := _wrong(rig, facts)) is not None:
-            statement = wrong
-    elif facts.fault is not None:
-        statement = facts.fault
-    else:
-        raise RuntimeError("a fault without words")
-    room, reserve = facts.room, rig.recorder.reserve_gb
-    pairing = None if facts.health is None else facts.health.pairing
+    pairing = None if seen.health is None else seen.health.pairing
+    room = room_for(rig, beside.free_bytes)
     return Status(
-        state=state,
-        since=facts.phase.since,
-        statement=statement,
-        notice=facts.notice,
-        alarms=facts.alarms,
-        guard=tap_guard(facts.phase),
+        state=now.state,
+        since=now.phase.since,
+        statement=_statement(now, beside, [camera.state for camera in cameras], rate, arriving=arriving),
+        notice=_notice(now),
+        alarms=beside.alarms,
+        guard=tap_guard(now.phase, beside.at.s),
         rig=rig.name,
         version=_VERSION,
         cameras=cameras,
         pulses=PulseStatus(
             arriving=arriving,
-            running=not facts.still,
+            running=not seen.still,
             rate_hz=rate and round(rate, 2),
             spread_us=None if pairing is None else pairing.spread_median_us,
             number=0 if pairing is None else pairing.seen,
-            fired=None if facts.health is None else _fired(facts.health),
-            made=None if facts.health is None else _made(facts.health.made),
+            fired=None if seen.health is None else _fired(seen.health),
+            made=None if seen.health is None else _made(seen.health.made),
         ),
-        preroll=_preroll(facts),
+        preroll=_preroll(now, beside),
         disk=DiskStatus(
             free_gb=round(room.free_bytes / 1e9, 2),
-            reserve_gb=reserve,
+            reserve_gb=rig.recorder.reserve_gb,
             seconds_left=round(room.seconds),
             jumps_left=room.jumps,
             jump_s=rig.recorder.jump_s,
         ),
-        recording=facts.recording,
-        last_recording=facts.last_recording,
-        last_jump=facts.last_jump,
-        next_jumper=facts.next_jumper,
-        processes=tuple(_process(name, pid, facts.restarts.get(name, 0)) for name, pid in facts.pids.items()),
+        recording=None if current is None or current.opening else current.view(beside.at.utc),
+        last_recording=now.recordings.last,
+        last_jump=beside.last_jump,
+        next_jumper=beside.next_jumper,
+        processes=tuple(_processes(now)),
     )
 
 
-def _wrong(rig: RigSettings, facts: Facts) -> Statement | None:
+def _notice(now: Situation) -> Statement | None:
+    return now.recordings.notice if now.state in {State.ARMED, State.RECORDING} else None
+
+
+def _statement(
+    now: Situation, beside: Beside, states: Sequence[CameraState], rate: float | None, *, arriving: bool
+) -> Statement:
+    """The state in words, or what is wrong; what is wrong now matters more than what befell the last recording."""
+    if now.state is State.FAULT:
+        if now.fault.statement is None:
+            raise RuntimeError("a fault without words")
+        return now.fault.statement
+    made = None if now.seen.health is None else now.seen.health.made
+    closed = made is not None and made.gate_open is False
+    said = about_state(
+        now.state, now.in_use.rig.cameras, states, arriving, rate, beside.overloaded,
+        still=now.seen.still, gate_closed=closed,
+    )  # fmt: skip
+    if said.level is Level.GOOD and (notice := _notice(now)) is not None:
+        said = notice
+    if said.level is Level.GOOD and (wrong := _wrong(now, beside)) is not None:
+        said = wrong
+    return said
+
+
+def _wrong(now: Situation, beside: Beside) -> Statement | None:
     """The worst alarm, or that the trigger is for set-up only; None: nothing."""
-    if facts.alarms:
-        return facts.alarms[0].statement
-    if facts.health is None:
+    if beside.alarms:
+        return beside.alarms[0].statement
+    if now.seen.health is None:
         return None
-    said = set_up_only(trigger_source(rig.trigger), facts.health.pairing)
+    said = set_up_only(trigger_source(now.in_use.rig.trigger), now.seen.health.pairing)
     return None if said is None else pairing_alarm(said)
 
 
-def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
-    trying = facts.heard is not None or facts.phase.state is State.ARMING
-    heard = facts.heard or [CameraPresence()] * len(rig.cameras)
-    reported = [None] * len(rig.cameras) if facts.health is None else facts.health.cameras
+def _cameras(now: Situation, beside: Beside) -> tuple[CameraStatus, ...]:
+    rig, health = now.in_use.rig, now.seen.health
+    trying = now.seen.cameras is not None or now.state is State.ARMING
+    heard = now.seen.cameras or [CameraPresence()] * len(rig.cameras)
+    reported = [None] * len(rig.cameras) if health is None else health.cameras
     found = []
     for camera, presence, report, columns in zip(rig.cameras, heard, reported, rig.columns(), strict=True):
         state = camera_state(trying, presence)
@@ -183,7 +156,7 @@ def _cameras(rig: RigSettings, facts: Facts) -> tuple[CameraStatus, ...]:
                 backend=camera.backend,
                 address=camera.address,
                 state=state,
-                statement=about_camera(camera, state, presence.said, overloaded=bool(facts.overloaded), idle=idle),
+                statement=about_camera(camera, state, presence.said, overloaded=bool(beside.overloaded), idle=idle),
                 columns=columns,
                 actions=None if report is None else _answers(report.actions),
                 **({} if report is None else {name: getattr(report, name) for name in _MEASURED}),
@@ -207,14 +180,18 @@ def _made(pulses: PulsesMade | None) -> MadePulses | None:
     return None if pulses is None else MadePulses(**msgspec.structs.asdict(pulses))
 
 
-def _preroll(facts: Facts) -> PrerollStatus:
-    if facts.health is None:
-        return PrerollStatus(seconds=0.0, limit_s=facts.preroll_s, memory_mb=0.0)
-    held = facts.health.preroll
-    seconds = min(held.seconds, round(facts.holding_s, 3))
+def _preroll(now: Situation, beside: Beside) -> PrerollStatus:
+    """What memory holds; the health record may be of before the last recording took it."""
+    if now.seen.health is None:
+        return PrerollStatus(seconds=0.0, limit_s=beside.preroll_s, memory_mb=0.0)
+    held = now.seen.health.preroll
+    seconds = min(held.seconds, round(beside.at.s - now.recordings.emptied_at, 3))
     return PrerollStatus(seconds=seconds, limit_s=held.limit_s, memory_mb=held.memory_mb)
 
 
-def _process(name: str, pid: int, restarts: int) -> ProcessStatus:
-    statement = process_restarted(name, restarts) if restarts else None
-    return ProcessStatus(name=name, pid=pid, restarts=restarts, statement=statement)
+def _processes(now: Situation) -> Iterator[ProcessStatus]:
+    restarts = {RECORDER: now.fault.back_off.deaths, **now.seen.restarts}
+    for name, pid in now.seen.pids.items():
+        times = restarts.get(name, 0)
+        statement = process_restarted(name, times) if times else None
+        yield ProcessStatus(name=name, pid=pid, restarts=times, statement=statement)

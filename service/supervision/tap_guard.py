@@ -11,7 +11,7 @@ from typing import Final
 from rig.api.recordings import StopOrder
 from rig.api.status import State, TapGuard
 from rig.errors import ChangedMeanwhileError, ConfirmFirstError, TooSoonError
-from service.supervision.state_machine import Phase
+from service.supervision.situation import Phase
 
 #: Second taps by cold fingers, and taps meant for the state before, come within this time after a change of state.
 HOLD_S: Final = 1.5
@@ -19,22 +19,29 @@ HOLD_S: Final = 1.5
 CONFIRM_S: Final = 3.0
 
 
-def tap_guard(phase: Phase) -> TapGuard:
-    """What a page has to know before it sends its next command."""
-    confirm_s = CONFIRM_S - phase.age_s if phase.state is State.RECORDING else 0.0
+def tap_guard(phase: Phase, now: float) -> TapGuard:
+    """What a page has to know before it sends its next command.
+
+    Args:
+        phase: the present state.
+        now: on the monotonic clock, s.
+    """
+    age_s = phase.age_s(now)
+    confirm_s = CONFIRM_S - age_s if phase.state is State.RECORDING else 0.0
     return TapGuard(
         number=phase.number,
-        hold_s=round(max(0.0, HOLD_S - phase.age_s), 2),
+        hold_s=round(max(0.0, HOLD_S - age_s), 2),
         confirm_s=round(max(0.0, confirm_s), 2),
     )
 
 
-def check_seen(phase: Phase, seen: int | None, *, opening: bool = False) -> None:
+def check_seen(phase: Phase, seen: int | None, now: float, *, opening: bool = False) -> None:
     """Check that a command was given in the present state, and not by a second tap.
 
     Args:
         phase: the present state.
         seen: number of the state that the operator saw; None: a program commands, which is not checked.
+        now: on the monotonic clock, s.
         opening: whether a recording is being opened, so that the state is about to change.
 
     Raises:
@@ -44,16 +51,16 @@ def check_seen(phase: Phase, seen: int | None, *, opening: bool = False) -> None
     if seen is None:
         return
     if seen != phase.number or opening:
-        now = "a recording is being started" if opening else f"the rig is {_IN_WORDS[phase.state]}"
-        raise ChangedMeanwhileError(f"{now} by now, so nothing was done: look at the state, then press again")
-    if phase.age_s < HOLD_S:
+        words = "a recording is being started" if opening else f"the rig is {_IN_WORDS[phase.state]}"
+        raise ChangedMeanwhileError(f"{words} by now, so nothing was done: look at the state, then press again")
+    if (age_s := phase.age_s(now)) < HOLD_S:
         raise TooSoonError(
-            f"the rig is {_IN_WORDS[phase.state]} since {phase.age_s:.1f} s only, so this counts as a second tap and "
+            f"the rig is {_IN_WORDS[phase.state]} since {age_s:.1f} s only, so this counts as a second tap and "
             f"nothing was done: press again after {HOLD_S:g} s"
         )
 
 
-def check_stop(phase: Phase, order: StopOrder) -> None:
+def check_stop(phase: Phase, order: StopOrder, now: float) -> None:
     """Check likewise that a recording is to be stopped.
 
     Raises:
@@ -62,11 +69,11 @@ def check_stop(phase: Phase, order: StopOrder) -> None:
     """
     if order.seen is None or (order.confirm and order.seen == phase.number):
         return
-    if order.seen == phase.number and phase.age_s < CONFIRM_S:
+    if order.seen == phase.number and (age_s := phase.age_s(now)) < CONFIRM_S:
         raise ConfirmFirstError(
-            f"the recording began {phase.age_s:.1f} s ago and goes on: hold the button to stop it all the same"
+            f"the recording began {age_s:.1f} s ago and goes on: hold the button to stop it all the same"
         )
-    check_seen(phase, order.seen)
+    check_seen(phase, order.seen, now)
 
 
 _IN_WORDS: Final = {

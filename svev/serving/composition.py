@@ -52,7 +52,7 @@ from service.regions import Regions
 from service.rehearsals import Rehearser
 from service.service import Service
 from service.status.event_hub import EventHub
-from service.supervision.commands import at_once
+from service.supervision.messages import JumpsKnown
 from service.supervision.supervisor import Supervisor
 from service.trains import Trains
 from svev import console
@@ -129,7 +129,7 @@ def serve(settings: ServiceSettings) -> None:
         exports = stack.enter_context(closing(_exports(rig, data, supervisor)))
 
         def in_use() -> tuple[RigSettings, str]:
-            return supervisor.rig, supervisor.rig_toml
+            return supervisor.now.in_use.rig, supervisor.now.in_use.toml
 
         rehearser = stack.enter_context(closing(Rehearser(REHEARSE, in_use, data, hub.tell, hub.wake)))
         lights = Lights(supervisor, settings.rig, Regions(supervisor, settings.rig, preroll_s))
@@ -152,15 +152,15 @@ def serve(settings: ServiceSettings) -> None:
             settings.tls,
         )
         reporter = _Reporter(supervisor, server, notify, url(listener, "https" if settings.tls else "http"))
-        supervisor.on_turn = reporter.report
+        supervisor.hooks.on_turn = reporter.report
         if rig.service.webhook is not None:
             messenger = stack.enter_context(Messenger(rig.service.webhook, hub.tell, service.recording))
-            supervisor.on_turn = _telling(reporter.report, rig.service.webhook, messenger, service)
+            supervisor.hooks.on_turn = _telling(reporter.report, rig.service.webhook, messenger, service)
 
         def end() -> None:
             server.should_exit = True
 
-        supervisor.on_end = end
+        supervisor.hooks.on_end = end
         with _signals(server, supervisor, notify):
             supervisor.start()
             try:
@@ -174,8 +174,8 @@ def serve(settings: ServiceSettings) -> None:
             finally:
                 service.close()
                 supervisor.stop(_STOP_S)
-        if supervisor.failure is not None:
-            raise supervisor.failure
+        if (failure := supervisor.now.loop.failure) is not None:
+            raise failure
 
 
 def _door(
@@ -197,13 +197,13 @@ def _door(
 
 def _exports(rig: RigSettings, data: Path, supervisor: Supervisor) -> Exports:
     """The exports of the recordings, which leave the disk its reserve and stand still while a recording runs."""
-    return Exports(data, supervisor.recordings.runs, lambda: usable_bytes(rig, free_bytes(data) or 0))
+    return Exports(data, supervisor.records, lambda: usable_bytes(rig, free_bytes(data) or 0))
 
 
 def _calibrating(rig_file: Path, data: Path, supervisor: Supervisor, slot: PreviewSlot) -> CalibrationHelper:
     """Helps to calibrate the cameras with what the recorder leaves for people to look at."""
     keep = CalibrationKeeper(supervisor, rig_file)
-    return CalibrationHelper(data, lambda: supervisor.rig, slot.fd, supervisor.recordings.runs, keep)
+    return CalibrationHelper(data, lambda: supervisor.rig, slot.fd, supervisor.records, keep)
 
 
 def _measurings(data: Path, supervisor: Supervisor, jumps: MeasuredJumps, catalogue: Catalogue) -> Measurings:
@@ -211,13 +211,13 @@ def _measurings(data: Path, supervisor: Supervisor, jumps: MeasuredJumps, catalo
 
     def found(jumps: tuple[LastJump, ...]) -> None:
         with suppress(ProcessDiedError):  # the service ends; the result is on the disk
-            supervisor.commands.ask(at_once(partial(supervisor.board.know_jumps, jumps)), _SOON_S)
+            supervisor.ask(partial(JumpsKnown, jumps=jumps), _SOON_S)
 
     earlier, hub = jumps.others_of_athlete, supervisor.hub
     removal = Removal(catalogue.delete, lambda: catalogue.trash().bytes, SteadyClock().trusted)
-    busy = supervisor.recordings.runs
+    busy = supervisor.records
     made = Measurings(data, lambda: supervisor.rig, busy, earlier, hub.tell, found, hub.wake, removal)
-    supervisor.recordings.on_log = made.opened
+    supervisor.hooks.on_log = made.opened
     return made
 
 
@@ -239,7 +239,7 @@ def _desks(catalogue: Catalogue, supervisor: Supervisor) -> Desks:
             return None
         return read_source(given.survey, given.calibration)
 
-    return Desks(find, source, supervisor.recordings.runs)
+    return Desks(find, source, supervisor.records)
 
 
 def _telling(

@@ -61,7 +61,7 @@ from service.recordings.archive import Archive
 from service.recordings.describing import as_recording
 from service.recordings.measured_jumps import MeasuredJumps
 from service.seam.cameras import CloseUp, Preview
-from service.supervision.state_machine import Phase
+from service.supervision.situation import Moment, Phase
 from service.supervision.tap_guard import check_seen, check_stop, tap_guard
 from svev.doctor.finding import Topic, passed, warning
 from tests.recorder.logs import ALL_OK, PERIOD_NS, RIG, RIG_TOML, make_tag, write_pulse
@@ -142,7 +142,7 @@ class MemoryService(Archive):
         }
         self.balls: Callable[[str], CameraBalls] = lambda name: CameraBalls(camera=name, width=160, height=120)
         self.through_the_lens: Callable[[NDArray[np.uint8]], NDArray[np.uint8]] = lambda image: image
-        self._phase = Phase.now(State.IDLE, 1)
+        self._phase = _phase(State.IDLE, 1)
         self._armed_at = time.monotonic()
         self._lock = threading.RLock()
         self.jumpers = JumperBook(changed=self._wake)
@@ -166,7 +166,7 @@ class MemoryService(Archive):
             return Status(
                 state=self.state,
                 since=self._phase.since,
-                guard=tap_guard(self._phase),
+                guard=tap_guard(self._phase, time.monotonic()),
                 next_jumper=self.jumpers.view().next,
                 statement=(self.fault if self.state is State.FAULT else None)
                 or Statement(code=f"state_{self.state.value}", text=f"The rig is {self.state.value}"),
@@ -237,7 +237,7 @@ class MemoryService(Archive):
 
     def start_recording(self, order: RecordingOrder) -> Recording:
         with self._lock:
-            check_seen(self._phase, order.seen)
+            check_seen(self._phase, order.seen, time.monotonic())
             if self.state is State.RECORDING:
                 raise StateForbidsError("a recording is under way: stop it first")
             if self.state is not State.ARMED:
@@ -273,7 +273,7 @@ class MemoryService(Archive):
             current = self._recording
             if current is None or current.id != recording_id:
                 return as_recording(self.catalogue.entry(recording_id))
-            check_stop(self._phase, order or StopOrder())
+            check_stop(self._phase, order or StopOrder(), time.monotonic())
             self._recording, self._last = None, recording_id
             write_recording(self.catalogue.directory, recording_id, session=current.session.model_dump())
             self._become(State.ARMED)
@@ -429,7 +429,7 @@ class MemoryService(Archive):
 
     def _become(self, state: State) -> None:
         self.state = state
-        self._phase = Phase.now(state, self._phase.number + 1)
+        self._phase = _phase(state, self._phase.number + 1)
         self.say(f"now {state.value}")
 
     def _pulse(self) -> RigPulse:
@@ -466,3 +466,8 @@ def write_recording(
             write_pulse(log, buffers, make_tag(pulse, statuses, SHAPE, UtcNs(start + pulse * PERIOD_NS)))
     buffers.close()
     return path
+
+
+def _phase(state: State, number: int) -> Phase:
+    at = Moment.now()
+    return Phase(state, at.utc, number, at.s)

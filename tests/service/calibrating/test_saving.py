@@ -52,5 +52,5 @@ def test_cameras_that_it_lacks_keep_the_calibration_before(tmp_path: Path, super
     assert joined == supervisor.rig.calibration == new.with_name("joined.json")
     cameras = json.loads(joined.read_text())["cameras"]
     assert {name: camera["c"] for name, camera in cameras.items()} == {"K1": 1200.0, "K2": 1300.0, "K3": 1200.0}
-    assert supervisor.rig_toml == rig.read_text()
+    assert supervisor.now.in_use.toml == rig.read_text()
     assert [event.code for event in supervisor.hub.after(0)].count("event_calibration") == 2

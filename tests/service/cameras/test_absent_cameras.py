@@ -65,36 +65,16 @@ def test_a_rig_that_loses_all_cameras_is_armed_again_when_enough_are_back(
 ) -> None:
     with _hill_and_service(tmp_path, loopback, "K3", least=2) as (hill, service):
         service.arm()
-        service.post("/api/arm", {"min_cameras": 1})  # a late tap: while armed it changes nothing
         hill.kill("K1")
         hill.kill("K2")
         fault = service.await_state("fault")["statement"]
         assert fault["code"] == "fault_no_camera"
         hill.restart("K2")
         status = service.await_cameras("absent", "ready", "absent")
-        assert status["state"] == "fault"
-        service.post("/api/arm")
-        status = service.await_state("fault")
-        assert status["statement"]["text"] == "1 of 3 cameras answer, 2 are needed: without K1, K3"
-        assert "arm without K1, K3" in status["statement"]["advice"]
+        assert status["state"] == "fault", "one is too few; what follows from it is a table in service/supervision"
         assert service.call("POST", "/api/recordings")[0] == 409
-        assert service.post("/api/arm", {"min_cameras": 1})["state"] == "armed"
-        service.post("/api/disarm")
-        service.await_state("idle")
-        service.post("/api/arm")
-        assert service.await_state("fault")["statement"]["values"]["least"] == 2, "once is not for ever"
         hill.restart("K1")
         status = service.await_state("armed")
         assert status["statement"]["code"] in {"state_armed_partly", "state_waiting_partly"}
-        hill.kill("K1")
-        status = service.await_cameras("absent", "ready", "absent")
-        assert status["state"] == "armed", "what is armed stays so while a camera is left"
-        hill.kill("K2")
-        service.await_state("fault")
-        service.post("/api/arm")
-        assert service.state() == "arming", "somebody has seen to it: tried anew at once"
-        service.await_state("fault")
-        service.post("/api/disarm")
-        service.await_state("idle")
     said = f"{fault['text']}; {fault['advice']}"
     fault_table.tell("Cameras and pulses", "all cameras go while the rig is armed", lost="-", said=said)

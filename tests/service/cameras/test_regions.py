@@ -22,8 +22,7 @@ from rig.topics import RIG_ATTACHMENT
 from rig.transport.recorder_commands import RecorderOptions
 from service.regions import Regions
 from service.status.event_hub import EventHub
-from service.supervision.commands import at_once
-from service.supervision.settings_control import RigInUse
+from service.supervision.messages import Arm
 from service.supervision.supervisor import Supervisor
 from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, Serving, serving
@@ -106,23 +105,25 @@ def _seen(log: Path, rig: RigSettings) -> Floats:
     return np.asarray(np.mean(whole, axis=0), float)
 
 
-def test_a_region_that_a_camera_does_not_take_is_given_back(tmp_path: Path, loopback: Loopback) -> None:
+def test_a_region_that_a_camera_does_not_take_is_given_back(
+    tmp_path: Path, loopback: Loopback, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = write_rig(tmp_path, "aravis", loopback, names=["K1", "K2"])
     rig, hub = load_rig(path), EventHub(lambda _: None)
     supervisor = Supervisor(rig, path.read_text(), hub, RecorderOptions(directory=tmp_path))
     supervisor.start()
     try:
-        supervisor.commands.ask(at_once(supervisor.arm), PATIENCE_S)
+        supervisor.ask(Arm, PATIENCE_S)
         wait_until(lambda: supervisor.status.state is State.ARMED, "the rig is armed", PATIENCE_S)
-        supervisor.limits.clear()  # a camera that does not say them
+        monkeypatch.setattr(Regions, "limits", lambda *_: None)  # a camera that does not say them
         said = (
             "K1 does not read out 320 x 240 px from 328, 96: camera K1 makes its OffsetX 320 .* goes back to 640 x 480"
         )
-        now = RigInUse(rig, path.read_text())
+        now = supervisor.now.in_use
         with pytest.raises(BadInputError, match=said):
             Regions(supervisor, path, 1.0).change("K1", Region(**PART | {"x": 328}), now)
         assert supervisor.status.state is State.ARMING
-        assert (supervisor.rig, supervisor.rig_toml) == (rig, path.read_text())
+        assert supervisor.now.in_use == now
         wait_until(lambda: supervisor.status.state is State.ARMED, "the rig is armed as before", PATIENCE_S)
         assert [camera.state for camera in supervisor.status.cameras] == ["ready", "ready"]
     finally:

@@ -11,7 +11,7 @@ import pytest
 
 from recorder.checking.verify import verify
 from rig.api.status import State
-from service.supervision.state_machine import FOLLOWS
+from service.supervision.phases import FOLLOWS
 from tests.capture.rigs import write_rig
 from tests.service.serving import Serving, serving
 from tests.support.loopback import Loopback

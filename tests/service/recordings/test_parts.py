@@ -2,7 +2,8 @@
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from functools import partial
+from itertools import accumulate
 from pathlib import Path
 
 import pytest
@@ -16,19 +17,17 @@ from rig.transport.process_table import BackOff
 from service.recordings.storage import check_room_for, room_for
 from service.status.event_hub import EventHub
 from service.supervision.commands import Commands
-from service.supervision.watching import PulseRate
+from service.supervision.messages import Burst
+from service.supervision.situation import PulseRate
 from svev.serving.systemd import log_line
 from tests.support.rigs import SIM
 
 
 def test_back_off_doubles_to_half_a_minute_and_forgets_after_a_good_one() -> None:
-    back_off = BackOff()
-    assert [back_off.died(5.0) for _ in range(7)] == [1, 2, 4, 8, 16, 30, 30]
-    assert back_off.died(61.0) == 1
-    assert back_off.died(1.0) == 2
-    back_off.forget()
-    assert back_off.died(1.0) == 1
-    assert back_off.deaths == 10
+    deaths = list(accumulate([5.0] * 7, BackOff.died, initial=BackOff()))
+    assert [back_off.wait_s for back_off in deaths] == [0, 1, 2, 4, 8, 16, 30, 30]
+    good = deaths[-1].died(61.0)
+    assert (good.wait_s, good.died(1.0).wait_s, good.died(1.0).forgotten().died(1.0)) == (1, 2, BackOff(10, 1.0))
 
 
 def _event(message: str = "hello", level: Level = Level.INFO) -> Event:
@@ -76,17 +75,13 @@ def test_the_rate_of_pulses_is_what_came_in_the_last_second(steps: list[int]) ->
     rate, total = PulseRate(), 0
     for second, step in enumerate(steps):
         total += step
-        rate.count(total, float(second))
+        rate = rate.counted(total, float(second))
     assert rate.rate_hz == steps[-1]
     assert rate.arriving == (steps[-1] > 0)
-    rate.forget()
-    assert not rate.arriving
 
 
 def test_a_report_that_is_late_says_nothing_of_the_rate() -> None:
-    rate = PulseRate()
-    rate.count(0, 0.0)
-    rate.count(300, 10.0)
+    rate = PulseRate().counted(0, 0.0).counted(300, 10.0)
     assert rate.rate_hz is None
     assert rate.arriving
 
@@ -112,28 +107,23 @@ def test_commands_are_answered_by_their_owner_in_order() -> None:
 
     def own() -> None:
         while not over.is_set():
-            commands.carry_out()
-
-    def note(number: int) -> Callable[["Future[int]"], None]:
-        def command(answer: "Future[int]") -> None:
-            done.append(number)
-            answer.set_result(number)
-
-        return command
-
-    def refuse(answer: "Future[int]") -> None:
-        raise StorageError("no room: make some")
+            for message in commands.fetch():
+                assert isinstance(message, Burst)
+                done.append(message.pulses)
+                if message.pulses < 50:
+                    message.answer.set_result(None)
 
     owner = threading.Thread(target=own)
     owner.start()
-    assert [commands.ask(note(number), 10.0) for number in range(50)] == list(range(50)) == done
-    with pytest.raises(StorageError, match="no room"):
-        commands.ask(refuse, 10.0)
+    for number in range(50):
+        commands.ask(partial(Burst, pulses=number), 10.0)
+    assert done == list(range(50))
     with pytest.raises(ProcessDiedError, match="did not get it done within 0"):
-        commands.ask(lambda _: None, 0.01)
+        commands.ask(partial(Burst, pulses=50), 0.01)
     over.set()
     owner.join(10)
+    commands.end_by(0.0)
     commands.end()
     with pytest.raises(ProcessDiedError, match="is ending"):
-        commands.ask(note(0), 10.0)
+        commands.ask(partial(Burst, pulses=51), 10.0)
     commands.close()

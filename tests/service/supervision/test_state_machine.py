@@ -1,30 +1,35 @@
-"""The state machine: which state may follow which, and that threads always see a state with its own beginning."""
+"""The states: which may follow which, and that threads always see a state with its own beginning."""
 
 import threading
-from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.api.status import State
-from service.supervision.state_machine import FOLLOWS, StateMachine
+from rig.events import Level
+from service.supervision.messages import Effect, Say
+from service.supervision.phases import FOLLOWS, move
+from service.supervision.situation import Moment
+from tests.service.supervision.situations import AT, situation
 
 
 @given(st.lists(st.sampled_from(State), max_size=30))
 def test_only_what_the_table_allows_happens_and_all_of_it_is_told(wishes: list[State]) -> None:
-    moves: list[tuple[State, State]] = []
-    machine = StateMachine(lambda before, to: moves.append((before, to)))
-    expected = [State.IDLE]
+    effects: list[Effect] = []
+    now, moves = situation(State.IDLE), 0
     for wish in wishes:
-        if wish in FOLLOWS[expected[-1]]:
-            machine.move(wish)
-            expected.append(wish)
+        before = now
+        if wish in FOLLOWS[before.state]:
+            now, moves = move(before, wish, AT, effects.append), moves + 1
+            assert (now.state, now.phase.number) == (wish, before.phase.number + 1)
         else:
-            with pytest.raises(ValueError, match=f"{wish} cannot follow {expected[-1]}"):
-                machine.move(wish)
-        assert machine.state is expected[-1]
-    assert moves == list(pairwise(expected))
+            with pytest.raises(ValueError, match=f"{wish} cannot follow {before.state}"):
+                move(before, wish, AT, effects.append)
+    assert len(effects) == moves
+    assert all(isinstance(effect, Say) and effect.name == "service" for effect in effects)
+    levels = {Level.INFO, *({Level.ERROR} if State.FAULT in wishes else ())}
+    assert {effect.level for effect in effects if isinstance(effect, Say)} <= levels
 
 
 def test_every_state_is_reached_from_idle_and_leads_back_to_it() -> None:
@@ -41,15 +46,16 @@ def test_every_state_is_reached_from_idle_and_leads_back_to_it() -> None:
 
 
 def test_readers_never_see_a_state_with_another_ones_beginning() -> None:
-    machine = StateMachine(lambda *_: None)
+    """A situation is replaced as a whole, so whoever reads one has what belongs together."""
+    now = [situation(State.IDLE)]
     seen: dict[object, State] = {}
     torn: list[object] = []
     over = threading.Event()
 
     def read() -> None:
         while not over.is_set():
-            phase = machine.phase
-            if seen.setdefault(phase.since, phase.state) is not phase.state:
+            phase = now[0].phase
+            if seen.setdefault(phase.number, phase.state) is not phase.state:
                 torn.append(phase)
 
     readers = [threading.Thread(target=read) for _ in range(3)]
@@ -57,7 +63,7 @@ def test_readers_never_see_a_state_with_another_ones_beginning() -> None:
         reader.start()
     for _ in range(300):
         for state in (State.ARMING, State.ARMED, State.DISARMING, State.IDLE):
-            machine.move(state)
+            now[0] = move(now[0], state, Moment.now(), lambda _: None)
     over.set()
     for reader in readers:
         reader.join(10)

@@ -1,9 +1,13 @@
 """State x message: what the supervisor does with commands and with what happens to the rig, without any process."""
 
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import nullcontext
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 
@@ -14,12 +18,13 @@ from rig.phrase import phrase
 from rig.transport.recorder_commands import RecorderOptions, StartRecording, StopRecording
 from rig.transport.recorder_reports import CameraNews
 from service.status.event_hub import EventHub
-from service.supervision.fault import Fault
+from service.supervision.messages import Acknowledge, Arm, Command, Disarm, Start, Stop
 from service.supervision.supervisor import Supervisor
 from tests.service.supervision.processes_in_memory import ProcessesInMemory
 from tests.support.rigs import SIM
 from tests.support.waiting import wait_until
 
+T = TypeVar("T")
 IDLE, ARMING, ARMED, RECORDING, FAULT = State.IDLE, State.ARMING, State.ARMED, State.RECORDING, State.FAULT
 
 
@@ -55,23 +60,32 @@ class Bench:
         """Turn until this state is reached."""
         wait_until(lambda: self.turn() is state, f"state {state}; so far {self.moves}", poll_s=0.001)
 
+    def ask(self, make: "Callable[[Future[T]], Command[T]]") -> "Future[T]":
+        """Give a command; raises why it is refused."""
+        answer: Future[T] = Future()
+        self.supervisor._obey(make(answer))
+        self.supervisor._show()
+        if answer.done():
+            answer.result(0)
+        return answer
+
     def arm(self) -> None:
         """Arm."""
-        self.supervisor.arm()
+        self.ask(Arm)
 
     def disarm(self) -> None:
         """Disarm."""
-        self.supervisor.disarm()
+        self.ask(Disarm)
 
     def start(self) -> None:
         """Order a recording."""
-        opened: Future[Recording] = Future()
-        self.supervisor.recordings.start(RecordingOrder(), opened)
-        self.opened = opened
+        self.opened = self.ask(partial(Start, order=RecordingOrder()))
 
     def stop(self) -> None:
         """Stop it, as somebody who is sure."""
-        self.supervisor.recordings.stop(order=StopOrder(confirm=True))
+        current = self.supervisor.now.recordings.current
+        assert current is not None
+        self.ask(partial(Stop, recording=current.id, order=StopOrder(confirm=True)))
 
     def one_camera_goes(self) -> None:
         """K1 is gone."""
@@ -117,10 +131,10 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr("service.processes.rig_session.prepare_programs", lambda _: None)
     made = Bench(tmp_path)
     yield made
-    made.supervisor._session.close()
-    made.supervisor.truths.end(5)
-    made.supervisor.commands.end()
-    made.supervisor.commands.close()
+    made.supervisor._world.close()
+    made.supervisor._world.end()
+    made.supervisor._commands.end()
+    made.supervisor._commands.close()
 
 
 @pytest.mark.parametrize("story", STORIES.values(), ids=STORIES)
@@ -211,10 +225,10 @@ def test_that_jumps_cannot_be_measured_is_an_alarm_until_they_can(bench: Bench) 
     bench.rig.measuring(refused)  # the process was killed, and its successor finds the same
     bench.turn()
     assert bench.supervisor.status.alarms == first
-    bench.supervisor.acknowledge(first[0].number)
+    bench.ask(partial(Acknowledge, alarm=first[0].number))
     assert bench.supervisor.status.alarms == (first[0].model_copy(update={"acknowledged": True}),)
     with pytest.raises(UnknownAlarmError, match="there is no alarm 99 any more"):
-        bench.supervisor.acknowledge(99)
+        bench.ask(partial(Acknowledge, alarm=99))
     bench.recorder_dies()
     bench.until(FAULT)
     assert alarms() == [said], "the recorder's death does not mend it"
@@ -228,11 +242,12 @@ def test_that_jumps_cannot_be_measured_is_an_alarm_until_they_can(bench: Bench) 
     assert alarms() == []
 
 
-def test_after_a_fault_the_supervisor_tries_again_by_itself(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_after_a_fault_the_supervisor_tries_again_by_itself(bench: Bench) -> None:
     bench.arm()
     bench.until(ARMED)
     bench.recorder_dies()
     bench.until(FAULT)
-    assert not bench.supervisor._fault.may_try, "not at once: it might die again and again"
-    monkeypatch.setattr(Fault, "may_try", property(lambda _: True))  # the seconds have passed
+    now = bench.supervisor.now
+    assert now.fault.again_at > time.monotonic(), "not at once: it might die again and again"
+    bench.supervisor.now = replace(now, fault=replace(now.fault, again_at=0.0))  # the seconds have passed
     bench.until(ARMED)

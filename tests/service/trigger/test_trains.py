@@ -103,7 +103,7 @@ def test_what_cannot_be_is_refused_before_anything_ends(
     path.write_text(path.read_text() + "exposure_us = 16300\n")
     hub = EventHub(lambda _: None)
     supervisor = Supervisor(load_rig(path), path.read_text(), hub, RecorderOptions(directory=tmp_path))
-    with closing(supervisor.commands), pytest.raises(error, match=said):
+    with closing(supervisor._commands), pytest.raises(error, match=said):
         Trains(supervisor, path, 5.0).change(TriggerChange(rate_hz=rate_hz, save=True))
     assert supervisor.rig.trigger.rate_hz == tomllib.loads(path.read_text())["trigger"]["rate_hz"] == 20
     assert hub.after(0) == []

@@ -10,8 +10,9 @@ from rig.phrase import plain
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ExternalTrigger
 from rig.transport.recorder_reports import CameraNews
-from service.processes.rig_processes import CameraPresence, RigProcesses
-from service.supervision.watching import why_not_armed
+from service.processes.rig_processes import CameraPresence
+from service.processes.rig_session import Processes, Seen
+from service.supervision.arming import why_not_armed
 from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import SCENARIO, make_rig, write_rig
 from tests.support.commands import run_svev
@@ -22,9 +23,8 @@ HERE = CameraPresence(CameraNews.CONNECTED, plain("a camera"))
 
 
 def _measured(rig: RigSettings, rate: SteadyRate | None) -> str:
-    processes = RigProcesses(rig, lambda _: None)
-    processes.cameras, processes.rate = [HERE] * len(rig.cameras), rate
-    fault = why_not_armed(rig, processes, len(rig.cameras))
+    seen = Seen(Processes.ALL, cameras=(HERE,) * len(rig.cameras), rate=rate)
+    fault = why_not_armed(rig, seen, len(rig.cameras))
     return "" if fault is None else fault.text
 
 

@@ -1,8 +1,7 @@
 """Sentences that can be said in another language: a stable code, the English text, and the values in it."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,18 +53,6 @@ def phrase(code: str, template: str, /, **values: Value) -> Phrase:
 def plain(text: str) -> Phrase:
     """A sentence that exists in English only: of a library, of the operating system, of a person."""
     return Phrase("", escaped(text))
-
-
-def as_plain(said: Phrase) -> dict[str, Any]:
-    """A phrase as dictionaries, for JSON."""
-    values = {name: as_plain(value) if isinstance(value, Phrase) else value for name, value in said.values.items()}
-    return {"code": said.code, "text": said.text, "values": values}
-
-
-def from_plain(data: Mapping[str, Any]) -> Phrase:
-    """The inverse of `as_plain`, for what a program of ours has said."""
-    values = {name: from_plain(value) if isinstance(value, dict) else value for name, value in data["values"].items()}
-    return Phrase(data["code"], data["text"], values)
 
 
 #: Where a sentence is wanted and there is nothing to say.

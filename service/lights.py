@@ -15,7 +15,7 @@ from service.rig_file import keep
 from service.supervision.messages import ChangeCamera
 from service.supervision.supervisor import Supervisor
 
-_SOON_S: Final = 10.0
+_ANSWER_S: Final = 10.0
 
 
 class Lights:
@@ -68,7 +68,7 @@ class Lights:
             if change.region is not None and change.region.region() != before.region:
                 self._regions.change(name, change.region.region(), new)
             elif lit:
-                supervisor.ask(partial(ChangeCamera, new=new, camera=name), _SOON_S)
+                supervisor.ask(partial(ChangeCamera, new=new, camera=name), _ANSWER_S)
             if lit:
                 said = phrase(
                     "event_light", "exposes for {exposure_us:g} us now, with a gain of {gain_db:g} dB",

@@ -21,7 +21,7 @@ from service.supervision.situation import RigInUse
 from service.supervision.supervisor import Supervisor
 
 #: Cameras have 20 s to answer at arming, and the first triplets 10 s more.
-_TRIED_S: Final = 45.0
+_TRIAL_ENDS_S: Final = 45.0
 
 
 class Regions:
@@ -69,7 +69,7 @@ class Regions:
         check_backends(rig)
         check_memory(rig, self._preroll_s)
         new = replace(also, rig=rig, toml=written_region(also.toml, name, region, camera.calibrated_region))
-        supervisor.ask(partial(ChangeRegion, new=new, camera=name), _TRIED_S)
+        supervisor.ask(partial(ChangeRegion, new=new, camera=name), _TRIAL_ENDS_S)
         said = phrase("event_region", "reads out {region} now", region=named(region))
         supervisor.hub.tell(Event.now(Level.INFO, name, said))
         if (why := calibration_unfit(camera)) is not None:

@@ -4,16 +4,11 @@ A rehearsal is what `svev rehearse` does: it needs processes and signals of its 
 verdict stays in a file of the recordings' folder, so that it is known after a restart of the service.
 """
 
-import json
-import os
-import subprocess
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from select import select
-from typing import Any, Final
+from typing import Final
 
 from pydantic import ValidationError
 
@@ -26,20 +21,60 @@ from rig.host.disk import replace_file
 from rig.host.files import TEXT_MAX, read_whole
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
-from rig.transport.launcher import program_environment
+from rig.transport.message import Message, Quit
+from rig.transport.process_table import Child, ProcessSpec
 
 NAME: Final = ".svev-rehearsal.json"
 _LOOK_S: Final = 0.1
 #: A program that is told to end has closed cameras and log after so long; else it is killed.
-_END_S: Final = 5.0
-_PIECE: Final = 1 << 16
+_PROGRAM_ENDS_S: Final = 5.0
+
+
+class Rehearse(Message):
+    """What the program is told.
+
+    Attributes:
+        rig: the rig.
+        toml: the text of its file.
+        directory: folder of the recordings.
+        seconds: how much is recorded.
+    """
+
+    rig: RigSettings
+    toml: str
+    directory: Path
+    seconds: float
+
+
+class RehearsalGoes(Message):
+    """How far it is."""
+
+    progress: RehearsalProgress
+
+
+class NoVerdict(Message):
+    """Why there is none."""
+
+    said: Phrase
+
+
+class Rehearsed(Message):
+    """What it showed; fields as `svev.rehearsal.Rehearsed` has them, `spread_us` the median."""
+
+    verdict: str
+    pulses: int
+    complete: int
+    headroom: dict[str, float]
+    jumps: int
+    spread_us: float | None
+    findings: tuple[Finding, ...]
 
 
 class Rehearser:
     """Any thread may call any method.
 
     Args:
-        program: command line of the program that rehearses.
+        program: main module of the program that rehearses; it takes `Rehearse` and says the other messages.
         in_use: gives the rig and its text, as they are in use.
         folder: of the recordings.
         tell: takes an event about what a rehearsal showed.
@@ -48,13 +83,13 @@ class Rehearser:
 
     def __init__(
         self,
-        program: Sequence[str],
+        program: str,
         in_use: Callable[[], tuple[RigSettings, str]],
         folder: Path,
         tell: Callable[[Event], None],
         changed: Callable[[], None],
     ) -> None:
-        self._program, self._in_use, self._folder = tuple(program), in_use, folder
+        self._program, self._in_use, self._folder = program, in_use, folder
         self._tell, self._changed = tell, changed
         self._lock = threading.Lock()
         self._progress: RehearsalProgress | None = None
@@ -104,68 +139,42 @@ class Rehearser:
 
     def _rehearse(self, seconds: float) -> None:
         rig, rig_toml = self._in_use()
-        asked = {
-            "rig": rig.model_dump(mode="json", exclude_unset=True),
-            "toml": rig_toml,
-            "directory": str(self._folder),
-            "seconds": seconds,
-        }
+        order = Rehearse(rig=rig, toml=rig_toml, directory=self._folder, seconds=seconds)
         try:
-            self._conclude(self._made(json.dumps(asked).encode() + b"\n", seconds))
+            self._conclude(self._made(order))
         finally:
             with self._lock:
                 self._progress = None
             self._changed()
 
-    def _made(self, asked: bytes, seconds: float) -> Rehearsal | None:
-        """Run the program."""
+    def _made(self, order: Rehearse) -> Rehearsal | None:
+        """Run the program; what the rehearsal showed, None if it is not wanted any more."""
         try:
-            environment = program_environment()
-            child = subprocess.Popen(self._program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+            child = Child(ProcessSpec("rehearsal", self._program, order, reports=RehearsalGoes | NoVerdict | Rehearsed))
         except OSError as error:
             why = error.strerror or str(error)
-            return _failed(phrase("why_no_program", "no program can be started ({why})", why=why), seconds)
+            return _failed(phrase("why_no_program", "no program can be started ({why})", why=why), order.seconds)
         try:
-            return self._follow(child, asked, seconds)
+            return self._follow(child, order.seconds)
         finally:
-            _dismiss(child)
+            child.control.send(Quit())
+            child.stop(_PROGRAM_ENDS_S)
 
-    def _follow(self, child: "subprocess.Popen[bytes]", asked: bytes, seconds: float) -> Rehearsal | None:
-        """Hear what the program says.
-
-        Returns:
-            What the rehearsal showed; None if it is not wanted any more.
-        """
-        if child.stdin is None or child.stdout is None:
-            raise TypeError("the program that rehearses has no standard input or output")
-        said = b""
-        try:
-            child.stdin.write(asked)
-            child.stdin.flush()
-            while not self._unwanted.is_set():
-                if not select([child.stdout], [], [], _LOOK_S)[0]:
-                    continue
-                piece = os.read(child.stdout.fileno(), _PIECE)
-                *lines, said = (said + piece).split(b"\n")
-                for line in lines:
-                    if (verdict := self._hear(json.loads(line), seconds)) is not None:
-                        return verdict
-                if not piece:
-                    break
-        except BrokenPipeError:  # it has ended before it knew what to do
-            pass
-        if self._unwanted.is_set():
-            return None
-        return _failed(phrase("why_rehearsal_ended", "the program that rehearses has ended by itself"), seconds)
-
-    def _hear(self, news: dict[str, Any], seconds: float) -> Rehearsal | None:
-        if "stage" in news:
-            self._progress = RehearsalProgress.model_validate(news)
-            self._changed()
-            return None
-        if "problem" in news:
-            return _failed(Phrase(**news["problem"]), seconds)
-        return _judged(news["rehearsed"], seconds)
+    def _follow(self, child: Child, seconds: float) -> Rehearsal | None:
+        """Hear what the program says."""
+        while not self._unwanted.is_set():
+            match child.control.next(_LOOK_S):
+                case RehearsalGoes(progress=progress):
+                    self._progress = progress
+                    self._changed()
+                case NoVerdict(said=said):
+                    return _failed(said, seconds)
+                case Rehearsed() as rehearsed:
+                    return _judged(rehearsed, seconds)
+            if child.control.ended:
+                why = phrase("why_rehearsal_ended", "the program that rehearses has ended by itself")
+                return _failed(why, seconds)
+        return None
 
     def _conclude(self, found: Rehearsal | None) -> None:
         """Remember a verdict, if there is one, and say it."""
@@ -184,20 +193,6 @@ class Rehearser:
             self._tell(Event.now(EventLevel.WARNING, "rehearsal", lost))
 
 
-def _dismiss(child: "subprocess.Popen[bytes]") -> None:
-    """Have the program end: the end of its standard input tells it to. If it does not, it is killed."""
-    if child.stdin is not None:
-        child.stdin.close()
-    try:
-        child.wait(_END_S)
-    except subprocess.TimeoutExpired:
-        child.kill()
-        with suppress(subprocess.TimeoutExpired):  # the disk holds it: it ends when that answers
-            child.wait(_END_S)
-    if child.stdout is not None:
-        child.stdout.close()
-
-
 def _failed(why: Phrase, seconds: float) -> Rehearsal:
     statement = Statement(
         level=Level.ERROR,
@@ -212,9 +207,8 @@ def _failed(why: Phrase, seconds: float) -> Rehearsal:
     )  # fmt: skip
 
 
-def _judged(rehearsed: dict[str, Any], seconds: float) -> Rehearsal:
-    """What the program's result says, see `svev.rehearsal.Rehearsed.to_json`."""
-    findings = tuple(Finding.model_validate(finding) for finding in rehearsed["findings"])
+def _judged(rehearsed: Rehearsed, seconds: float) -> Rehearsal:
+    findings = rehearsed.findings
     wrong = next((finding for finding in findings if finding.level == "FAIL"), None)
     if wrong is not None:
         verdict = RehearsalVerdict.NOT_READY
@@ -230,18 +224,17 @@ def _judged(rehearsed: dict[str, Any], seconds: float) -> Rehearsal:
     else:
         verdict = RehearsalVerdict.READY
         statement = Statement(level=Level.GOOD, code="rehearsal_ready", text="ready to record")
-    spread = rehearsed["spread_us"]
     return Rehearsal(
         verdict=verdict,
         statement=statement,
-        line=rehearsed["verdict"],
+        line=rehearsed.verdict,
         ended=datetime.now(UTC),
         seconds=seconds,
-        pulses=rehearsed["pulses"],
-        complete=rehearsed["complete"],
-        headroom=rehearsed["headroom"],
-        jumps=rehearsed["jumps"],
-        spread_us=None if spread is None else spread["median"],
+        pulses=rehearsed.pulses,
+        complete=rehearsed.complete,
+        headroom=rehearsed.headroom,
+        jumps=rehearsed.jumps,
+        spread_us=rehearsed.spread_us,
         findings=findings,
     )
 

@@ -1,4 +1,4 @@
-"""Writes what was changed while the rig runs into the rig file, as it is by then: what else was edited in it stays."""
+"""The rig file in use: reads the calibration that it names, and writes into it what was changed while the rig runs."""
 
 import os
 from collections.abc import Callable
@@ -7,11 +7,13 @@ from pathlib import Path
 from rig.errors import StorageError
 from rig.host.disk import replace_file
 from rig.phrase import Phrase
+from rig.settings.model import RigSettings
 from rig.settings.strict_toml import read_text
+from rig.transport.recorder_commands import Calibration
 
 
 def keep(path: Path, edit: Callable[[str], str], not_kept: Callable[[str], Phrase]) -> None:
-    """Edit the rig file.
+    """Edit the rig file, as it is by then: what else was edited in it stays.
 
     Args:
         path: of the rig file.
@@ -29,3 +31,17 @@ def keep(path: Path, edit: Callable[[str], str], not_kept: Callable[[str], Phras
         replace_file(path, text.encode(), links=True)
     except OSError as error:
         raise StorageError(not_kept(error.strerror or str(error))) from error
+
+
+def read_calibration(rig: RigSettings) -> Calibration | None:
+    """Read the calibration file that the rig file names; None if it names none.
+
+    Raises:
+        BadInputError: the calibration file is missing or wrong.
+    """
+    if rig.calibration is None:
+        return None
+    # Imported here because photogrammetry and its libraries take memory and a second to load.
+    from analysis.export.camera_calibration import calibration_for_log  # noqa: PLC0415
+
+    return calibration_for_log(rig.calibration, rig.cameras)

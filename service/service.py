@@ -51,13 +51,13 @@ from service.supervision.messages import Acknowledge, Arm, ChangeSession, Disarm
 from service.supervision.supervisor import Supervisor
 from service.trains import Trains
 
-_SOON_S: Final = 10.0
-_OPEN_S: Final = 15.0
+_ANSWER_S: Final = 10.0
+_LOG_OPENS_S: Final = 15.0
 #: Closing a log of some GB may wait for a slow disk.
-_CLOSE_S: Final = 60.0
+_LOG_CLOSES_S: Final = 60.0
 #: After each request for a preview the recorder goes on copying images for this time.
-_LEASE_S: Final = 3.0
-_POLL_S: Final = 0.02
+_PREVIEW_LEASE_S: Final = 3.0
+_PREVIEW_LOOK_S: Final = 0.02
 
 
 class Service(Archive):
@@ -135,11 +135,11 @@ class Service(Archive):
             return self._begin_to_arm(order)
 
     def _begin_to_arm(self, order: ArmOrder) -> Status:
-        return self._supervisor.ask(partial(Arm, min_cameras=order.min_cameras), _SOON_S)
+        return self._supervisor.ask(partial(Arm, min_cameras=order.min_cameras), _ANSWER_S)
 
     def acknowledge(self, alarm: int) -> Status:
         """Note that somebody has seen an alarm."""
-        self._supervisor.ask(partial(Acknowledge, alarm=alarm), _SOON_S)
+        self._supervisor.ask(partial(Acknowledge, alarm=alarm), _ANSWER_S)
         return self.status()
 
     def rehearsals(self) -> Rehearsals:
@@ -169,7 +169,7 @@ class Service(Archive):
 
     def disarm(self) -> Status:
         """Begin to disarm."""
-        return self._supervisor.ask(Disarm, _SOON_S)
+        return self._supervisor.ask(Disarm, _ANSWER_S)
 
     def start_recording(self, order: RecordingOrder) -> Recording:
         """Start; returns when the log is open. What lies in the trash makes room for it if it must."""
@@ -183,7 +183,7 @@ class Service(Archive):
         if status.state is State.ARMED:
             self.exports.tidy()
             self._keeper.make_room(supervisor.rig.recorder.jump_s if order.duration_s is None else order.duration_s)
-        return supervisor.ask(partial(Start, order=order), _OPEN_S)
+        return supervisor.ask(partial(Start, order=order), _LOG_OPENS_S)
 
     def mark(self, mark: JumpMark) -> Marked:
         """Begin a recording at the mark, with the seconds before; one that runs already only gets the mark."""
@@ -203,8 +203,8 @@ class Service(Archive):
         """Stop, and return when the log is closed."""
         supervisor = self._supervisor
         with suppress(UnknownRecordingError):  # not in progress: it is over, or the catalogue does not know it either
-            supervisor.ask(partial(Stop, recording=recording_id, order=order), _CLOSE_S)
-            supervisor.truths.wait(_SOON_S)
+            supervisor.ask(partial(Stop, recording=recording_id, order=order), _LOG_CLOSES_S)
+            supervisor.truths.wait(_ANSWER_S)
         return as_recording(self._catalogue.entry(recording_id))
 
     def change_session(self, recording_id: str, change: SessionChange) -> Recording:
@@ -212,7 +212,7 @@ class Service(Archive):
         entry = self._catalogue.change_session(recording_id, change.texts())
         self._measurings.renamed(recording_id, self._catalogue.file(recording_id))
         note = partial(ChangeSession, recording=recording_id, change=change.fields())
-        return self._supervisor.ask(note, _SOON_S) or self._with_next_part(entry)
+        return self._supervisor.ask(note, _ANSWER_S) or self._with_next_part(entry)
 
     def delete_recording(self, recording_id: str) -> Recording:
         """Put a recording into the trash."""
@@ -303,14 +303,14 @@ class Service(Archive):
         """Wait for the image of another pulse than `newer_than`; None if none came in time."""
         deadline = time.monotonic() + timeout_s
         while True:
-            self._slot.want(_LEASE_S)
+            self._slot.want(_PREVIEW_LEASE_S)
             if self.status().state is not State.IDLE and self._slot.newest() not in {0, newer_than}:
                 image = self._slot.read()
                 # One of before another region has columns that mean something else.
                 sized = image is not None and image.pixels.shape == self._supervisor.rig.triplet_shape
                 if image is not None and sized and image.pulse != newer_than:
                     return image
-            if time.monotonic() > deadline or self._closing.wait(_POLL_S):
+            if time.monotonic() > deadline or self._closing.wait(_PREVIEW_LOOK_S):
                 return None
 
     def events(self, after: int) -> list[Event]:

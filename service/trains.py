@@ -20,7 +20,7 @@ from service.supervision.messages import Burst, ChangeRate, RunTrain
 from service.supervision.supervisor import Supervisor
 from triggering.sources.choice import trigger_source
 
-_SOON_S: Final = 10.0
+_ANSWER_S: Final = 10.0
 
 
 class Trains:
@@ -59,7 +59,7 @@ class Trains:
             self._check_made_here(TriggerControl.RATE)
             if change.running is not None:
                 self._check_made_here(TriggerControl.RUNNING)
-                self._supervisor.ask(partial(RunTrain, running=change.running), _SOON_S)
+                self._supervisor.ask(partial(RunTrain, running=change.running), _ANSWER_S)
             if change.rate_hz is not None and change.rate_hz != self._supervisor.rig.trigger.rate_hz:
                 self._change_rate(change.rate_hz)
             if change.save:
@@ -74,7 +74,7 @@ class Trains:
         """
         with self._supervisor.changing:
             self._check_made_here(TriggerControl.RUNNING)
-            self._supervisor.ask(partial(Burst, pulses=pulses), _SOON_S)
+            self._supervisor.ask(partial(Burst, pulses=pulses), _ANSWER_S)
             return self.view()
 
     def _check_made_here(self, control: TriggerControl) -> None:
@@ -113,7 +113,7 @@ class Trains:
         _check_dead_time(rig)
         check_memory(rig, self._preroll_s)
         new = replace(in_use, rig=rig, toml=written_rate(in_use.toml, rate_hz))
-        supervisor.ask(partial(ChangeRate, new=new), _SOON_S)
+        supervisor.ask(partial(ChangeRate, new=new), _ANSWER_S)
         said = phrase("event_rate", "is to make {rate_hz:g} pulses per second from now on", rate_hz=rate_hz)
         supervisor.hub.tell(Event.now(Level.INFO, TRIGGER, said))
 

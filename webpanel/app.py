@@ -21,7 +21,6 @@ from webpanel.door.spellings import Spellings
 from webpanel.door.streams import OpenStreams
 from webpanel.page_files import serve_page
 from webpanel.problems import handle_errors
-from webpanel.routes.alarms import alarms_router
 from webpanel.routes.athletes import athletes_router
 from webpanel.routes.calibrating import calibrating_router
 from webpanel.routes.common import COMMON
@@ -35,10 +34,9 @@ from webpanel.routes.login import login_router
 from webpanel.routes.measuring import measuring_router
 from webpanel.routes.observing import CountRequests, Metrics, observing_router
 from webpanel.routes.preview import cameras_router, preview_router
-from webpanel.routes.recordings import recordings_router
-from webpanel.routes.rig import rig_router
+from webpanel.routes.recordings import recordings_router, trash_router
+from webpanel.routes.rig import alarms_router, rig_router
 from webpanel.routes.start_list import start_list_router
-from webpanel.routes.trash import trash_router
 
 
 def create_app(

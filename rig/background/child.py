@@ -1,102 +1,97 @@
-"""Starts such a program, tells it what to do, and hears how far it is, by lines of JSON; and lets it stand still.
+"""Starts a program that does long work, tells it what to do, hears how far it is, and lets it stand still.
 
 Standing still is SIGSTOP, so that it is at once, wherever the program is in its work.
 """
 
-import json
 import os
 import signal
-import subprocess
+import time
 from collections.abc import Callable, Sequence
-from select import select
 from typing import Any, Final
 
-from rig.transport.launcher import program_command, program_environment
+from rig.background.messages import End, Failed, Order, Ready
+from rig.transport.process_table import Child, ProcessSpec
 
-#: Argument of a program that takes what processor time it gets.
-AT_ONCE: Final = "at-once"
-#: What a program says first: from now on the kernel kills it if we end, so it may be given its work, and be stopped.
-READY: Final = {"ready": True}
 #: So long a program may go on after a recording has begun: two pulses at 100 Hz.
 _LOOK_S: Final = 0.02
-_PIECE: Final = 1 << 16
+_NICE: Final = 19
 
 
 def run_child(
     module: str,
-    asked: dict[str, Any],
+    order: Order,
+    says: Any,
     *,
     busy: Callable[[], bool],
     wanted: Callable[[], bool],
-    tell: Callable[[dict[str, Any]], None],
-    hold: Callable[[bool], None],
+    tell: Callable[[Any], None] = lambda _: None,
+    hold: Callable[[bool], None] = lambda _: None,
     yielding: bool = True,
     inherited: Sequence[int] = (),
-) -> dict[str, Any] | None:
+) -> End | None:
     """Run a program to its end.
 
     Args:
-        module: its main module; it calls `rig.background.program.serve`.
-        asked: what it is to do.
+        module: its main module; its `main` calls `rig.background.program.serve`.
+        order: what it is to do.
+        says: type of its messages, or union of them, beside those that all programs say.
         busy: whether it has to stand still at present; asked often, so it is to be quick.
         wanted: whether anybody still wants what it does.
-        tell: takes what it says of how far it is.
+        tell: takes what it says before its end.
         hold: called with True when it has to stand still from now on, with False when it goes on.
         yielding: whether it takes only the processor time that nobody else wants; False where nothing is recorded.
         inherited: descriptors that it has too, by the same numbers.
 
     Returns:
-        What it said at its end; None if it was ended because nobody wants it any more.
+        What it has come to; None if it was ended because nobody wants it any more.
 
     Raises:
         OSError: it cannot be started, or has ended by itself.
     """
-    command, environment = [*program_command(module), *([] if yielding else [AT_ONCE])], program_environment()
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=inherited, env=environment
-    ) as child:
-        try:
-            return _followed(child, asked, busy, wanted, tell, hold)
-        finally:
-            child.kill()
+    brake = _Brake(busy, hold)
+    while brake.look() and wanted():
+        time.sleep(_LOOK_S)
+    if not wanted():
+        return None
+    name = module.rpartition(".")[2]
+    child = Child(ProcessSpec(name, module, order, inherit=tuple(inherited), reports=Ready | Failed | says))
+    try:
+        if yielding:  # while it has one thread: those that its libraries start are like it
+            os.setpriority(os.PRIO_PROCESS, child.pid, _NICE)
+            os.sched_setscheduler(child.pid, os.SCHED_IDLE, os.sched_param(0))
+        return _followed(child, brake, wanted, tell)
+    finally:
+        child.kill()
 
 
-def _followed(
-    child: "subprocess.Popen[bytes]",
-    asked: dict[str, Any],
-    busy: Callable[[], bool],
-    wanted: Callable[[], bool],
-    tell: Callable[[dict[str, Any]], None],
-    hold: Callable[[bool], None],
-) -> dict[str, Any] | None:
-    held, ready, given, stopped, said = False, False, False, False, b""
-    if child.stdin is None or child.stdout is None:
-        raise TypeError("the program has no standard input and output")
+class _Brake:
+    """Tells whether the work has to stand still, and says so when that changes."""
+
+    def __init__(self, busy: Callable[[], bool], hold: Callable[[bool], None]) -> None:
+        self._busy, self._hold, self._on = busy, hold, False
+
+    def look(self) -> bool:
+        """Whether it has to stand still now."""
+        if self._busy() != self._on:
+            self._on = not self._on
+            self._hold(self._on)
+        return self._on
+
+
+def _followed(child: Child, brake: _Brake, wanted: Callable[[], bool], tell: Callable[[Any], None]) -> End | None:
+    ready = stopped = False
     while wanted():
-        if busy() != held:
-            held = not held
-            hold(held)
-        if ready and not given and not held:
-            given = True
-            child.stdin.write(json.dumps(asked).encode() + b"\n")
-            child.stdin.flush()
-        if given and stopped != held:
-            stopped = held
+        if ready and brake.look() != stopped:
+            stopped = not stopped
             child.send_signal(signal.SIGSTOP if stopped else signal.SIGCONT)
-        readable, _, _ = select([child.stdout], [], [], _LOOK_S)
-        if not readable:
-            continue
-        piece = os.read(child.stdout.fileno(), _PIECE)
-        *lines, said = (said + piece).split(b"\n")
-        for line in lines:
-            news: dict[str, Any] = json.loads(line)
-            if "end" in news:
-                end: dict[str, Any] = news["end"]
-                return end
-            if news == READY:
-                ready = True
-            else:
-                tell(news)
-        if not piece:
+        for message in child.control.receive(_LOOK_S):
+            match message:
+                case Ready():
+                    ready = True
+                case End():
+                    return message
+                case _:
+                    tell(message)
+        if child.control.ended:
             raise ChildProcessError(0, "the program has ended by itself")
     return None

@@ -12,13 +12,24 @@ from pathlib import Path
 from typing import Any, Final, Generic, TypeVar
 
 from rig.background.child import run_child
+from rig.background.messages import End, Failed, Order, Progress
 from rig.background.program import Teller, serve
 from rig.errors import SvevError
-from rig.phrase import Phrase, from_plain, phrase
+from rig.phrase import Phrase, phrase
 
 State = TypeVar("State")
 _ORDER, _ANSWER = "order", "answer"
 _ENDED: Final = phrase("errand_ended", "the program that does this was ended by something else: try again")
+
+
+class ErrandOrder(Order):
+    """Do what the file in this folder says."""
+
+    folder: Path
+
+
+class ErrandDone(End):
+    """What it has come to is in a file beside it."""
 
 
 class Errands(Generic[State]):
@@ -28,8 +39,7 @@ class Errands(Generic[State]):
         program: main module that does them; it calls `run_errand`.
         nothing: state of those who have asked for nothing.
         busy: whether programs have to stand still at present; None: there is nothing better to do on this computer.
-        heard: gives the state from the one before and what the program says of how far it is, or `paused`: whether it
-            stands still.
+        heard: gives the state from the one before and how far the program is, or whether it stands still.
         done: gives the state from who asked, what the program has come to, and the folder of its files, which is
             removed afterwards. It may take long, and raise OSError or SvevError.
         failed: gives the state from the one before the errand and the reason.
@@ -42,7 +52,7 @@ class Errands(Generic[State]):
         nothing: State,
         busy: Callable[[], bool] | None,
         *,
-        heard: Callable[[State, dict[str, Any]], State],
+        heard: Callable[[State, Progress | bool], State],
         done: Callable[[str, Any, Path], State],
         failed: Callable[[State, Phrase], State],
         folder: Path | None = None,
@@ -140,21 +150,22 @@ class Errands(Generic[State]):
             Path(folder, _ORDER).write_bytes(pickle.dumps(ordered))
             end = run_child(
                 self._program,
-                {"folder": folder},
+                ErrandOrder(folder=Path(folder)),
+                Progress | ErrandDone,
                 busy=self._busy or (lambda: False),
                 wanted=lambda: who in self._wanted,
                 tell=lambda news: self._hear(who, news),
-                hold=lambda held: self._hear(who, {"paused": held}),
+                hold=lambda held: self._hear(who, held),
                 yielding=self._busy is not None,
             )
             if end is None or not self.works(who):
                 return None
-            if "problem" in end:
-                return self._failed(before, from_plain(end["problem"]))
+            if isinstance(end, Failed):
+                return self._failed(before, end.said)
             answer = pickle.loads(Path(folder, _ANSWER).read_bytes())  # noqa: S301 - our program wrote it just now
             return self._done(who, answer, Path(folder))
 
-    def _hear(self, who: str, news: dict[str, Any]) -> None:
+    def _hear(self, who: str, news: Progress | bool) -> None:
         with self._lock:
             if who in self._wanted:
                 self._states[who] = self._heard(self._states[who], news)
@@ -167,13 +178,12 @@ def run_errand(work: Callable[[Any, Path, Teller], object]) -> None:
         work: takes what was ordered, a folder for files, and whom to tell, and gives what it has come to.
     """
 
-    def asked(what: dict[str, Any], tell: Teller) -> dict[str, Any]:
-        folder = Path(what["folder"])
-        order = pickle.loads(Path(folder, _ORDER).read_bytes())  # noqa: S301 - the service wrote it just now
-        Path(folder, _ANSWER).write_bytes(pickle.dumps(work(order, folder, tell)))
-        return {}
+    def do(what: ErrandOrder, tell: Teller) -> ErrandDone:
+        order = pickle.loads(Path(what.folder, _ORDER).read_bytes())  # noqa: S301 - the service wrote it just now
+        Path(what.folder, _ANSWER).write_bytes(pickle.dumps(work(order, what.folder, tell)))
+        return ErrandDone()
 
-    serve(asked)
+    serve({ErrandOrder: do})
 
 
 def _refused(folder: Path, error: OSError) -> Phrase:

@@ -1,64 +1,60 @@
-"""The frame of such a program: what it is asked, and how it says how far it is."""
+"""The frame of such a program: what it is told, and how it says how far it is."""
 
-import json
-import os
-import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import reduce
+from operator import or_
 from typing import Any, Final
 
-from rig.background.child import AT_ONCE, READY
+from rig.background.messages import End, Failed, Order, Ready
 from rig.errors import SvevError
-from rig.host.endings import be_killed_with_parent
-from rig.phrase import as_plain, plain
+from rig.phrase import plain
+from rig.transport.channel import ControlChannel
+from rig.transport.child import begin
+from rig.transport.message import Message, Quit
 
-_NICE: Final = 19
-#: Between two lines that say how far it is.
+#: Between two messages that say how far it is.
 _TELL_S: Final = 0.1
+_SENT_S: Final = 1.0
 
 
 class Teller:
     """Says how far the work is."""
 
-    def __init__(self) -> None:
-        self._told = 0.0
+    def __init__(self, control: ControlChannel[Any]) -> None:
+        self._control, self._told = control, 0.0
 
-    def __call__(self, *, last: bool = False, **news: object) -> None:
+    def __call__(self, message: Message, *, last: bool = False) -> None:
         """Say it, unless something was said a moment ago.
 
         Args:
+            message: what is said.
             last: of its kind; it is said in any case.
-            news: what is said.
         """
         if last or time.monotonic() - self._told > _TELL_S:
             self._told = time.monotonic()
-            _say(news)
+            self._control.send(message)
 
 
-def serve(work: Callable[[dict[str, Any], Teller], dict[str, Any]]) -> None:
-    """Do the work that the first line of standard input asks for, and say what it has come to.
+def serve(works: Mapping[type[Order], Callable[[Any, Teller], End]]) -> None:
+    """Do what is ordered, and say what it has come to; the whole of such a program.
 
     It ends with the service, also while it stands still: the kernel kills it.
 
     Args:
-        work: takes what is asked and whom to tell; its libraries are to be imported within, so that their threads have
-            our low priority too.
+        works: what is done, by the type of the order. It takes the order and whom to tell; its libraries are to be
+            imported within, so that their threads have our low priority too.
     """
-    if AT_ONCE not in sys.argv[1:]:
-        os.nice(_NICE)
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-    be_killed_with_parent()
-    _say(READY)  # fails if the service has ended before that
-    asked: dict[str, Any] = json.loads(sys.stdin.readline())
+    orders: Any = reduce(or_, works)
+    child = begin(orders, Quit, grace_s=0.0, killed_with_parent=True)
+    order: Order = child.config
+    child.control.send(Ready())
     try:
-        end = work(asked, Teller())
+        end = works[type(order)](order, Teller(child.control))
     except SvevError as error:
-        end = {"problem": as_plain(error.said)}
+        end = Failed(said=error.said)
     except OSError as error:
-        end = {"problem": as_plain(plain(str(error)))}
-    _say({"end": end})
-
-
-def _say(what: dict[str, Any]) -> None:
-    sys.stdout.write(json.dumps(what) + "\n")
-    sys.stdout.flush()
+        end = Failed(said=plain(str(error)))
+    child.control.send(end)
+    while child.control.waiting:  # longer than any deadline, if it stands still meanwhile
+        child.control.drain(_SENT_S)

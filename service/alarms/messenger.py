@@ -20,7 +20,7 @@ QUEUE_MAX: Final = 100
 _FIRST_PAUSE_S: Final = 1.0
 _LONGEST_PAUSE_S: Final = 300.0
 #: At the end of the service, what waits is sent within this time, if the receiver takes it.
-_END_S: Final = 3.0
+_LAST_SENDING_S: Final = 3.0
 
 
 class Messenger:
@@ -61,7 +61,7 @@ class Messenger:
         with self._changed:
             self._over = True
             self._changed.notify_all()
-        self._thread.join(_END_S)
+        self._thread.join(_LAST_SENDING_S)
 
     def offer(self, found: Iterable[tuple[Notification, str]]) -> None:
         """Have notifications sent, each with the id of the recording that it is about; empty: of none."""

@@ -12,7 +12,7 @@ from rig.settings.webhook import Occasion
 
 #: A change of a camera, of the fault or of the disk is told so long after the last one of it at the earliest, s: a
 #: camera with a loose plug comes and goes every few seconds.
-_AGAIN_S: Final = 60.0
+_TOLD_AGAIN_S: Final = 60.0
 #: The disk is nearly full when no more jumps than these fit on it; the page warns at the same numbers.
 _FEW_JUMPS: Final = (20, 1)
 
@@ -131,8 +131,8 @@ class Occasions:
 
     def _changed(self, topic: str, bad: bool, now: float) -> bool:
         """Note how something is; whether it is otherwise than was told, and time enough has passed since."""
-        told, at = self._told.get(topic, (False, -_AGAIN_S))
-        if bad is told or now < at + _AGAIN_S:
+        told, at = self._told.get(topic, (False, -_TOLD_AGAIN_S))
+        if bad is told or now < at + _TOLD_AGAIN_S:
             return False
         self._told[topic] = bad, now
         return True

@@ -7,7 +7,7 @@ from rig.api.statement import Level, Statement
 from rig.phrase import Phrase
 
 #: A recording that begins so soon after somebody came into sight has him: memory holds the seconds before.
-_SOON_S: Final = 3.0
+_HELD_BEFORE_S: Final = 3.0
 _ADVICE: Final = "if it was just now, press Save last jump; otherwise there is nothing to do"
 
 
@@ -56,7 +56,7 @@ class Unrecorded:
             self._moved_at = self._called = None
             return None
         self._called = next((line for line in skipped if line in new), self._called)
-        if self._moved_at is not None and now > self._moved_at + _SOON_S:
+        if self._moved_at is not None and now > self._moved_at + _HELD_BEFORE_S:
             text = "somebody was seen while nothing was recorded: the last jump may not be recorded"
             return Statement(level=Level.WARNING, code="alarm_unrecorded_seen", text=text, advice=_ADVICE)
         if self._called is not None and (line := skipped.get(self._called)) is not None:  # else it was undone

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Cells along the longer side of the region.
-_CELLS: Final = 40
+_CELLS_ALONG_SIDE: Final = 40
 #: A cell deviates if it differs by so many of its usual deviations, and of grey values at least.
 _DEVIATIONS: Final = 6.0
 _LEAST_GREY: Final = 6.0
@@ -26,11 +26,11 @@ _FOLLOW_NEW_S: Final = 20.0
 #: Nothing is found before the usual image is known for so long, s.
 _LEARN_S: Final = 2.0
 #: More of the region does not move at once: that is light.
-_MOST: Final = 0.5
+_MOST_MOVING: Final = 0.5
 #: What moves covers other cells in the next image: this share of its cells at least.
-_NEW: Final = 0.25
+_NEW_CELLS: Final = 0.25
 #: Images farther apart than this do not show the same motion, s.
-_APART_S: Final = 0.5
+_SAME_MOTION_S: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,21 +95,21 @@ class MotionDetector:
             return None
         best = 1 + int(np.argmax(sizes[1:, cv2.CC_STAT_AREA]))
         cells = int(sizes[best, cv2.CC_STAT_AREA])
-        if not self._least_share * deviates.size <= cells <= _MOST * deviates.size:
+        if not self._least_share * deviates.size <= cells <= _MOST_MOVING * deviates.size:
             return None
         return _Group(np.asarray(labels == best), time_s)
 
     def _has_moved(self, group: _Group) -> bool:
         """Whether the group has come to new cells since the image before; a lamp that goes on stays where it is."""
         before = self._before
-        if before is None or group.time_s - before.time_s > _APART_S:
+        if before is None or group.time_s - before.time_s > _SAME_MOTION_S:
             return False
-        return bool(np.count_nonzero(group.mask & ~before.mask) >= _NEW * np.count_nonzero(group.mask))
+        return bool(np.count_nonzero(group.mask & ~before.mask) >= _NEW_CELLS * np.count_nonzero(group.mask))
 
 
 def _cells(region: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Mean grey of every cell."""
     rows, columns = region.shape
-    edge = max(1.0, max(rows, columns) / _CELLS)
+    edge = max(1.0, max(rows, columns) / _CELLS_ALONG_SIDE)
     size = (max(1, round(columns / edge)), max(1, round(rows / edge)))
     return cv2.resize(region, size, interpolation=cv2.INTER_AREA).astype(np.float32)

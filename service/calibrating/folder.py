@@ -22,7 +22,7 @@ PICTURES: Final = "pictures"
 RESULT: Final = "calibration.json"
 _SET: Final = "set.json"
 #: More pictures tell nothing new, and take minutes to adjust.
-MOST: Final = 24
+MOST_PICTURES: Final = 24
 _NAME: Final = re.compile(r"\d{3,}\.png")
 
 
@@ -48,14 +48,6 @@ class PictureSet:
     def pictures(self) -> Path:
         """The folder of the pictures."""
         return self.folder / PICTURES
-
-    @property
-    def layout(self) -> dict[str, float]:
-        """As `analysis.targets.pattern.Layout` takes it."""
-        order = self.order
-        return {
-            "columns": order.columns, "rows": order.rows, "board_mm": order.square_mm, "single_mm": order.target_mm,
-        }  # fmt: skip
 
 
 def new_set(directory: Path, order: CalibratingOrder, regions: Mapping[str, Region]) -> PictureSet:

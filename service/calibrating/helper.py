@@ -9,24 +9,49 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from rig.api.calibrating import CalibratedLens, Calibrating, CalibratingOrder, CalibratingState, SeenTarget
 from rig.api.statement import Statement
 from rig.background.child import run_child
+from rig.background.messages import End, Failed, Order
 from rig.errors import StateForbidsError, StorageError
-from rig.phrase import as_plain, phrase
+from rig.phrase import phrase
 from rig.settings.camera import Region
 from rig.settings.model import RigSettings
-from service.calibrating.folder import MOST, RESULT, PictureSet, last_set, new_set, numbers, remove_last
-from service.calibrating.refusals import COMPUTING, IN_USE, NO_CALIBRATION, NO_PICTURE, NO_PICTURES, NO_PROTOCOL
-from service.calibrating.said import lens, problem_in, seen
+from service.calibrating.folder import MOST_PICTURES, RESULT, PictureSet, last_set, new_set, numbers, remove_last
+from service.calibrating.messages import Compute, Computed, Find, Looked, as_error
 
 #: Without anybody who looks at it, the helper ends after so long a time.
-_LEASE_S: Final = 60.0
-_END_S: Final = 5.0
-_FINDING: Final = "service.calibrating.finding"
-_COMPUTING: Final = "service.calibrating.computing"
+_LOOKED_AT_S: Final = 60.0
+_PROGRAM_ENDS_S: Final = 5.0
+_PROGRAM: Final = "service.calibrating.program"
+
+#: Why something is refused.
+_COMPUTING: Final = phrase(
+    "calibrating_computing",
+    "a calibration is being computed: wait until it is done, then take pictures away",
+)
+_NO_PICTURE: Final = phrase(
+    "calibrating_no_picture",
+    "there is no picture to take away: hold the target still before the cameras",
+)
+_NO_PICTURES: Final = phrase(
+    "calibrating_no_pictures",
+    "there are no pictures to compute from: hold the target before the cameras first",
+)
+_NO_CALIBRATION: Final = phrase(
+    "calibrating_none",
+    "there is no calibration yet: compute it, then put it into the rig file",
+)
+_NO_PROTOCOL: Final = phrase(
+    "calibrating_no_protocol",
+    "there is no protocol yet: compute the calibration first",
+)
+_IN_USE: Final = phrase(
+    "calibrating_in_use",
+    "the calibration by these pictures is in the rig file: begin anew for another one",
+)
 
 
 class CalibrationHelper:
@@ -52,7 +77,7 @@ class CalibrationHelper:
         self._lock, self._commands = threading.Lock(), threading.RLock()
         self._state, self._held = CalibratingState.OFF, False
         self._set = last_set(directory, rig().calibration)
-        self._news: dict[str, Any] = {}
+        self._seen = Looked()
         self._problem: Statement | None = None
         self._lenses: tuple[CalibratedLens, ...] = ()
         self._saved = False
@@ -68,11 +93,11 @@ class CalibrationHelper:
             taken = [] if self._set is None else numbers(self._set.pictures)
             return Calibrating(
                 state=CalibratingState.HELD if working and self._held else self._state,
-                still=self._state is CalibratingState.LOOKING and bool(self._news.get("still")),
-                full=len(taken) >= MOST,
+                still=self._state is CalibratingState.LOOKING and self._seen.still,
+                full=len(taken) >= MOST_PICTURES,
                 folder=None if self._set is None else str(self._set.pictures),
                 taken=len(taken),
-                cameras=() if self._set is None else self._seen(self._set.regions),
+                cameras=() if self._set is None else self._targets(self._set.regions),
                 problem=self._problem,
                 lenses=self._lenses,
                 saved=self._saved,
@@ -95,7 +120,7 @@ class CalibrationHelper:
             self._end()
             with self._lock:
                 if known is None or order.anew or self._saved:
-                    known, self._news = new_set(self._directory, printed, regions), {}
+                    known, self._seen = new_set(self._directory, printed, regions), Looked()
                 self._set, self._problem, self._lenses, self._saved = known, None, (), False
             self._start(CalibratingState.LOOKING, self._find)
             return self.view()
@@ -115,11 +140,11 @@ class CalibrationHelper:
         """
         with self._commands:
             if self._state is CalibratingState.COMPUTING:
-                raise StateForbidsError(COMPUTING)
+                raise StateForbidsError(_COMPUTING)
             self._check_unsaved()
             try:
                 if self._set is None or not remove_last(self._set.pictures):
-                    raise StateForbidsError(NO_PICTURE)
+                    raise StateForbidsError(_NO_PICTURE)
             except OSError as error:
                 raise StorageError(
                     phrase(
@@ -144,7 +169,7 @@ class CalibrationHelper:
                 return self.view()
             self._check_unsaved()
             if self._set is None or not numbers(self._set.pictures):
-                raise StateForbidsError(NO_PICTURES)
+                raise StateForbidsError(_NO_PICTURES)
             self._end()
             with self._lock:
                 self._problem, self._lenses, self._saved = None, (), False
@@ -161,7 +186,7 @@ class CalibrationHelper:
         """
         with self._commands:
             if self._state is not CalibratingState.DONE or self._set is None:
-                raise StateForbidsError(NO_CALIBRATION)
+                raise StateForbidsError(_NO_CALIBRATION)
             now = self._regions()
             changed = [name for name, region in self._set.regions.items() if now.get(name) != region]
             if changed:
@@ -185,7 +210,7 @@ class CalibrationHelper:
             StateForbidsError: none is computed.
         """
         if self._state is not CalibratingState.DONE or self._set is None:
-            raise StateForbidsError(NO_PROTOCOL)
+            raise StateForbidsError(_NO_PROTOCOL)
         return self._set.folder / "protocol.html"
 
     def close(self) -> None:
@@ -199,11 +224,18 @@ class CalibrationHelper:
     def _check_unsaved(self) -> None:
         """Check that the rig file does not name what is computed from these pictures."""
         if self._saved:
-            raise StateForbidsError(IN_USE)
+            raise StateForbidsError(_IN_USE)
 
-    def _seen(self, regions: Mapping[str, Region]) -> tuple[SeenTarget, ...]:
-        cameras, looking = self._news.get("cameras", {}), self._state is CalibratingState.LOOKING
-        return tuple(seen(name, region, cameras.get(name), looking=looking) for name, region in regions.items())
+    def _targets(self, regions: Mapping[str, Region]) -> tuple[SeenTarget, ...]:
+        """What the cameras have seen; corners count while the helper is looking."""
+        seen = self._seen.cameras or {}
+        nothing = {} if self._state is CalibratingState.LOOKING else {"corners": ()}
+        return tuple(
+            seen[name].model_copy(update=nothing)
+            if name in seen
+            else SeenTarget(camera=name, width=region.width, height=region.height)
+            for name, region in regions.items()
+        )
 
     def _start(self, state: CalibratingState, work: Callable[[PictureSet], None]) -> None:
         if self._set is None:
@@ -217,51 +249,36 @@ class CalibrationHelper:
     def _end(self) -> None:
         self._unwanted.set()
         if self._worker is not None:
-            self._worker.join(_END_S)
+            self._worker.join(_PROGRAM_ENDS_S)
             self._worker = None
         with self._lock:
             if self._state in {CalibratingState.LOOKING, CalibratingState.COMPUTING}:
                 self._state = CalibratingState.OFF
 
     def _find(self, pictures: PictureSet) -> None:
-        rig = self._rig()
-
         def wanted() -> bool:
-            looked_at = time.monotonic() - self._looked < _LEASE_S
+            looked_at = time.monotonic() - self._looked < _LOOKED_AT_S
             return looked_at and self._regions() == pictures.regions and not self._unwanted.is_set()
 
-        asked = {
-            "fd": self._live,
-            "rig": rig.model_dump(mode="json", exclude_unset=True),
-            "folder": str(pictures.pictures),
-            "layout": pictures.layout,
-        }
-        end = self._run(_FINDING, asked, wanted, inherited=(self._live,), yielding=False)
+        order = Find(fd=self._live, rig=self._rig(), folder=pictures.pictures, printed=pictures.order)
+        end = self._run(order, wanted, yielding=False)
         self._conclude(CalibratingState.OFF, CalibratingState.LOOKING, end)
 
     def _compute(self, pictures: PictureSet) -> None:
-        asked = {"folder": str(pictures.folder), "layout": pictures.layout}
-        end = self._run(_COMPUTING, asked, lambda: not self._unwanted.is_set())
-        if end is not None and "lenses" in end:
+        order = Compute(folder=pictures.folder, printed=pictures.order)
+        end = self._run(order, lambda: not self._unwanted.is_set())
+        if isinstance(end, Computed):
             with self._lock:
-                self._lenses = tuple(lens(each) for each in end["lenses"])
-        done = CalibratingState.FAILED if end is not None and "problem" in end else CalibratingState.DONE
+                self._lenses = end.lenses
+        done = CalibratingState.FAILED if isinstance(end, Failed) else CalibratingState.DONE
         self._conclude(CalibratingState.OFF if end is None else done, CalibratingState.COMPUTING, end)
 
-    def _run(
-        self,
-        module: str,
-        asked: dict[str, Any],
-        wanted: Callable[[], bool],
-        *,
-        inherited: tuple[int, ...] = (),
-        yielding: bool = True,
-    ) -> dict[str, Any] | None:
-        def tell(news: dict[str, Any]) -> None:
+    def _run(self, order: Order, wanted: Callable[[], bool], *, yielding: bool = True) -> End | None:
+        def tell(news: Looked) -> None:
             with self._lock:
-                if news:
-                    self._news = {**self._news, **news}
-                    self._problem = problem_in(news)
+                self._problem = news.problem
+                if news.cameras is not None:
+                    self._seen = news
 
         def hold(held: bool) -> None:
             with self._lock:
@@ -269,22 +286,16 @@ class CalibrationHelper:
 
         try:
             return run_child(
-                module,
-                asked,
-                busy=self._busy,
-                wanted=wanted,
-                tell=tell,
-                hold=hold,
-                yielding=yielding,
-                inherited=inherited,
-            )
+                _PROGRAM, order, Looked | Computed,
+                busy=self._busy, wanted=wanted, tell=tell, hold=hold, yielding=yielding, inherited=(self._live,),
+            )  # fmt: skip
         except OSError as error:
             why = error.strerror or str(error)
             said = phrase("why_calibrating_ended", "the program that works on the pictures ended ({why})", why=why)
-            return {"problem": as_plain(said)}
+            return Failed(said=said)
 
-    def _conclude(self, now: CalibratingState, before: CalibratingState, end: dict[str, Any] | None) -> None:
+    def _conclude(self, now: CalibratingState, before: CalibratingState, end: End | None) -> None:
         with self._lock:
             if self._state is before:
                 self._state = now
-                self._problem = problem_in(end or {})
+                self._problem = as_error(end.said) if isinstance(end, Failed) else None

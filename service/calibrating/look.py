@@ -3,9 +3,9 @@
 The kept pictures on the disk are what counts: one that somebody removes is forgotten with the next look.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Final
 
 import cv2
 import numpy as np
@@ -14,16 +14,26 @@ from analysis.targets.detection import Sight, find_targets
 from analysis.targets.moving import Watch
 from analysis.targets.pattern import Layout
 from analysis.targets.views import views
+from rig.api.calibrating import SeenTarget
+from rig.api.statement import Level, Statement
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.host.disk import replace_file
 from rig.host.files import TEXT_MAX, read_whole
 from rig.images.picture import Grey, measurable
-from rig.phrase import as_plain
+from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from rig.transport.preview import PreviewImage
 from service.aids import frame_of, shown_as
-from service.calibrating.folder import MOST, kept_pictures, next_number, picture_path
+from service.calibrating.folder import MOST_PICTURES, kept_pictures, next_number, picture_path
+from service.calibrating.messages import Looked, as_error, stated
+
+_MIRRORED: Final = Statement(
+    level=Level.WARNING,
+    code="target_mirrored",
+    text="the picture shows the target in a mirror",
+    advice="turn off the mirror or flip of the camera",
+)
 
 
 class Look:
@@ -40,7 +50,7 @@ class Look:
         self._kept: dict[Path, Sight] = {}
         self._number = next_number(folder)
 
-    def at(self, image: PreviewImage) -> dict[str, Any]:
+    def at(self, image: PreviewImage) -> Looked:
         """Look at a triplet, keep its pictures if it is time for it, and say what there is.
 
         Raises:
@@ -55,18 +65,19 @@ class Look:
             seen = {name: find_targets(frame, self._layout, name) for name, frame in frames.items()}
             self._remember()
         except BadInputError as error:
-            return {"problem": as_plain(error.said)}
+            return Looked(problem=as_error(error.said))
         kept = {camera.name: self._kept_of(camera.name) for camera in self._rig.cameras}
-        if len({path.name for path in self._kept}) < MOST and (taken := self._watch.look(seen, kept)):
+        if len({path.name for path in self._kept}) < MOST_PICTURES and (taken := self._watch.look(seen, kept)):
             for name in sorted(taken):
                 self._keep(name, frames[name], seen[name])
                 kept[name].append(seen[name])
             self._number += 1
-        return {
-            "still": self._watch.still,
-            "mirrored": any(sight.mirrored for sight in seen.values()),
-            "cameras": {name: self._said(seen.get(name), sights) for name, sights in kept.items()},
-        }
+        mirrored = any(sight.mirrored for sight in seen.values())
+        return Looked(
+            problem=_MIRRORED if mirrored else None,
+            still=self._watch.still,
+            cameras={camera.name: self._said(camera, seen.get(camera.name), kept) for camera in self._rig.cameras},
+        )
 
     def _kept_of(self, camera: str) -> list[Sight]:
         return [sight for path, sight in self._kept.items() if path.parent.name == camera]
@@ -85,15 +96,18 @@ class Look:
             if path not in self._kept and (image := _picture(path)) is not None:
                 self._kept[path] = find_targets(image, self._layout, path.name)
 
-    def _said(self, sight: Sight | None, kept: Sequence[Sight]) -> dict[str, Any]:
+    def _said(self, camera: CameraSettings, sight: Sight | None, kept: Mapping[str, Sequence[Sight]]) -> SeenTarget:
         """What a camera shows now, and what its kept pictures show."""
-        shown = views(kept, self._layout)
-        return {
-            "corners": [] if sight is None else [(round(c.x, 2), round(c.y, 2)) for c in sight.corners.values()],
-            "pictures": shown.pictures,
-            "cells": shown.cells.tolist(),
-            "missing": [as_plain(each) for each in shown.missing],
-        }
+        shown, corners = views(kept[camera.name], self._layout), () if sight is None else sight.corners.values()
+        return SeenTarget(
+            camera=camera.name,
+            width=camera.region.width,
+            height=camera.region.height,
+            corners=tuple((round(corner.x, 2), round(corner.y, 2)) for corner in corners),
+            pictures=shown.pictures,
+            cells=tuple(map(tuple, shown.cells.tolist())),
+            missing=tuple(stated(each) for each in shown.missing),
+        )
 
 
 def _picture(path: Path) -> Grey | None:

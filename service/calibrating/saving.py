@@ -9,13 +9,12 @@ from rig.events import Event, Level
 from rig.host.disk import replace_file
 from rig.phrase import Phrase, phrase
 from rig.settings.calibration import with_calibration, written_calibration
-from service.recordings.calibration import read_calibration
-from service.rig_file import keep
+from service.rig_file import keep, read_calibration
 from service.supervision.messages import ChangeCalibration
 from service.supervision.situation import RigInUse
 from service.supervision.supervisor import Supervisor
 
-_SOON_S: Final = 10.0
+_ANSWER_S: Final = 10.0
 _JOINED: Final = "joined.json"
 
 
@@ -50,7 +49,7 @@ class CalibrationKeeper:
             rig = with_calibration(supervisor.rig, file, cameras)
             text = written_calibration(supervisor.now.in_use.toml, file, cameras)
             new = RigInUse(rig, text, read_calibration(rig))
-            supervisor.ask(partial(ChangeCalibration, new=new), _SOON_S)
+            supervisor.ask(partial(ChangeCalibration, new=new), _ANSWER_S)
             said = phrase("event_calibration", "is {file} from now on", file=str(file))
             supervisor.hub.tell(Event.now(Level.INFO, "calibration", said))
 

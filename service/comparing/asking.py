@@ -5,23 +5,28 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import date
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final, TypeVar
 
 from recorder.catalogue.entry import SUFFIX
 from rig.api.athletes import AthleteJump
 from rig.api.comparison import Comparison, Span
 from rig.api.statement import Level
 from rig.background.child import run_child
+from rig.background.messages import End, Failed, Order
 from rig.errors import BadInputError, StateForbidsError
 from rig.phrase import phrase
+from service.comparing.program import Compared, CompareGroups, JumpFile, ShowBeside, Shown
 from service.measuring.results import result_file
+
+Answer = TypeVar("Answer", bound=End)
 
 #: Two jumps take some two seconds, a season of one athlete some ten.
 _DEADLINE_S: Final = 60.0
 #: So many jumps of a span are compared, and so many of other days tell the scatter: the newest ones.
-_MOST: Final = 100
-_MOST_OTHERS: Final = 60
+_MOST_JUMPS: Final = 100
+_MOST_OTHER_JUMPS: Final = 60
 
 
 class Comparisons:
@@ -51,7 +56,7 @@ class Comparisons:
         if first.since < second.until and second.since < first.until:
             raise BadInputError(phrase("comparing_overlap", "the spans overlap: choose two that have no day in common"))
         compared = [[each for each in jumps if span.since <= each.jump.time < span.until] for span in (first, second)]
-        groups = [self._comparable(group)[:_MOST] for group in compared]
+        groups = [self._comparable(group)[:_MOST_JUMPS] for group in compared]
         used = [len(group) for group in groups]
         if not all(used):
             raise BadInputError(
@@ -61,9 +66,9 @@ class Comparisons:
         for each in (each for each in jumps if not any(each in group for group in compared)):
             days[each.jump.time.date()].append(each)
         others = [self._comparable(day) for day in days.values()]
-        end = self._ask({"groups": groups + list(_up_to(_MOST_OTHERS, others))})
         left_out = sum(len(group) for group in compared) - sum(used)
-        return Comparison.model_validate(end | {"first": used[0], "second": used[1], "left_out": left_out})
+        asked = tuple(map(tuple, (*groups, *_up_to(_MOST_OTHER_JUMPS, others))))
+        return self._ask(CompareGroups(groups=asked, left_out=left_out), Compared).comparison
 
     def page(self, jumps: Sequence[AthleteJump], others: Sequence[AthleteJump], language: str) -> str:
         """The page that shows two jumps side by side.
@@ -77,28 +82,30 @@ class Comparisons:
             StateForbidsError: a recording runs.
             BadInputError: one was not measured in the whole log, or they cannot be compared.
         """
-        shown = [self._with_result(each) for each in jumps]
-        if None in shown:
+        shown = self._measured(jumps)
+        if len(shown) < len(jumps):
             raise BadInputError(
                 phrase("comparing_unmeasured", "one of the jumps was not measured in its log: measure it, then compare")
             )
-        return str(self._ask({"jumps": shown + self._comparable(others)[:_MOST_OTHERS], "language": language})["page"])
+        asked = tuple(shown + self._comparable(others)[:_MOST_OTHER_JUMPS])
+        return self._ask(ShowBeside(jumps=asked, language=language), Shown).page
 
-    def _comparable(self, jumps: Sequence[AthleteJump]) -> list[dict[str, Any]]:
+    def _comparable(self, jumps: Sequence[AthleteJump]) -> list[JumpFile]:
         """Those that were measured well in the whole log, with the file of their result."""
-        good = [self._with_result(each) for each in jumps if each.level is Level.GOOD]
-        return [each for each in good if each is not None]
+        return self._measured([each for each in jumps if each.level is Level.GOOD])
 
-    def _with_result(self, jump: AthleteJump) -> dict[str, Any] | None:
-        """A jump with the file of its result, if its log was measured."""
-        log = self._directory / f"{jump.jump.recording}{SUFFIX}"
-        file = None if jump.level is Level.INFO else result_file(log, "jumper.json")
-        if file is None:
-            return None
-        who = {"athlete": jump.athlete.strip(), "bib": jump.bib}
-        return {"log": str(log), "file": str(file), "jump": jump.jump.jump, **who}
+    def _measured(self, jumps: Sequence[AthleteJump]) -> list[JumpFile]:
+        """Those whose log was measured, with the file of their result."""
+        found = []
+        for each in jumps:
+            log = self._directory / f"{each.jump.recording}{SUFFIX}"
+            file = None if each.level is Level.INFO else result_file(log, "jumper.json")
+            if file is not None:
+                who = each.athlete.strip()
+                found.append(JumpFile(log=log, file=file, jump=each.jump.jump, athlete=who, bib=each.bib))
+        return found
 
-    def _ask(self, what: dict[str, Any]) -> dict[str, Any]:
+    def _ask(self, order: Order, answer: type[Answer]) -> Answer:
         deadline = time.monotonic() + _DEADLINE_S
         if self._busy() or not self._turn.acquire(timeout=_DEADLINE_S):
             raise StateForbidsError(
@@ -107,33 +114,31 @@ class Comparisons:
                 )
             )
         try:
-            end = run_child(
-                "service.comparing.program",
-                what,
-                busy=self._busy,
-                wanted=lambda: time.monotonic() < deadline,
-                tell=lambda _: None,
-                hold=lambda _: None,
-            )
+            wanted = partial(_before, deadline)
+            end = run_child("service.comparing.program", order, answer, busy=self._busy, wanted=wanted)
         except OSError as error:
             raise StateForbidsError(
                 phrase("comparing_failed", "the jumps cannot be compared ({why}): try again", why=str(error.strerror))
             ) from error
         finally:
             self._turn.release()
-        if end is None:
+        if isinstance(end, Failed):
+            raise BadInputError(end.said.text)
+        if not isinstance(end, answer):
             raise StateForbidsError(
                 phrase(
                     "comparing_late",
                     "the jumps are not compared yet after a minute: try again when nothing is recorded",
                 )
             )
-        if "problem" in end:
-            raise BadInputError(end["problem"]["text"])
         return end
 
 
-def _up_to(most: int, groups: Iterable[list[dict[str, Any]]]) -> Iterator[list[dict[str, Any]]]:
+def _before(deadline: float) -> bool:
+    return time.monotonic() < deadline
+
+
+def _up_to(most: int, groups: Iterable[list[JumpFile]]) -> Iterator[list[JumpFile]]:
     """Groups of two or more, as long as they have no more than `most` together."""
     for group in groups:
         most -= len(group)

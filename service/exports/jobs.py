@@ -14,17 +14,19 @@ from typing import Any, Final
 
 from rig.api.export import ENDINGS, ExportJob, ExportOrder, ExportState
 from rig.background.child import run_child
+from rig.background.messages import Failed
 from rig.errors import StateForbidsError, StorageError, UnknownExportError
 from rig.host.files import make_folder
-from rig.phrase import Phrase, from_plain, phrase
+from rig.phrase import Phrase, phrase
+from service.exports.program import Export, Exported, Exporting
 
 FOLDER: Final = ".exports"
 #: A file is kept for so long, unless its room is needed.
 KEPT_S: Final = 86_400.0
 #: So many exports wait at most.
 _QUEUE_MAX: Final = 50
-_LOOK_S: Final = 0.2
-_END_S: Final = 10.0
+_RECORDING_LOOK_S: Final = 0.2
+_WORKER_ENDS_S: Final = 10.0
 _OVER: Final = (ExportState.DONE, ExportState.FAILED)
 
 
@@ -158,7 +160,7 @@ class Exports:
             self._closed.set()
             worker = self._worker
         if worker is not None:
-            worker.join(_END_S)
+            worker.join(_WORKER_ENDS_S)
 
     def _place(self, job: ExportJob) -> Path:
         return self._folder / job.id / job.name
@@ -173,7 +175,7 @@ class Exports:
                     return
                 job, log = waiting[0], self._logs[waiting[0].id]
             if self._busy():
-                self._closed.wait(_LOOK_S)
+                self._closed.wait(_RECORDING_LOOK_S)
             else:
                 self._make(job, log)
 
@@ -185,14 +187,17 @@ class Exports:
             self._change(job.id, state=ExportState.RUNNING)
             end = run_child(
                 "service.exports.program",
-                {"log": str(log), "order": job.order.model_dump(mode="json"), "out": str(place)},
+                Export(log=log, order=job.order, out=place),
+                Exporting | Exported,
                 busy=self._busy,
                 wanted=lambda: job.id in self._jobs and not self._closed.is_set(),
-                tell=lambda news: self._change(job.id, **news),
+                tell=lambda news: self._change(job.id, done=news.done, pulses=news.pulses),
                 hold=lambda held: self._change(job.id, state=ExportState.PAUSED if held else ExportState.RUNNING),
             )
-            if end is not None:
-                self._end(job.id, **({"problem": from_plain(end["problem"])} if "problem" in end else end))
+            if isinstance(end, Failed):
+                self._end(job.id, problem=end.said)
+            elif isinstance(end, Exported):
+                self._end(job.id, bytes=end.bytes)
         except OSError as error:
             self._end(
                 job.id,

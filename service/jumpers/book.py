@@ -30,7 +30,7 @@ from service.jumpers.table import Table, read_table, readings_of
 
 _UNDO_MAX: Final = 30
 #: How long a call waits until its change is on the disk; then it goes on, and an event says that it is not.
-_KEPT_S: Final = 2.0
+_ON_DISK_S: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,7 +285,7 @@ class JumperBook:
         found = self._list
         self._tell()
         if self._keeper is not None:
-            self._keeper.wait(_KEPT_S)
+            self._keeper.wait(_ON_DISK_S)
         return found
 
     def _tell(self) -> None:

@@ -6,7 +6,7 @@ from typing import Final
 from rig.api.start_list import NewLine, Preview, ReadingChoice, StartList
 from service.jumpers.table import Reading, Table
 
-_SHOWN: Final = 5
+_LINES_SHOWN: Final = 5
 #: So many texts that differ show which letters are right.
 _WORDS: Final = 6
 _FIELDS: Final = ("bib", "athlete", "gate", "club", "notes")
@@ -26,7 +26,7 @@ def previewed(readings: Sequence[Reading], present: StartList) -> Preview:
     named = tuple("athlete" if name in {"first", "last"} else name for name in table.named)
     return Preview(
         jumpers=len(table.lines),
-        lines=table.lines[:_SHOWN],
+        lines=table.lines[:_LINES_SHOWN],
         columns=table.named,
         added=tuple(name for name in dict.fromkeys(named) if name not in there),
         removed=tuple(name for name in there if name not in named) if table.named else (),

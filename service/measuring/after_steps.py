@@ -12,15 +12,18 @@ from recorder.log.measured_path import measured_path
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, MeasuringStep
 from rig.background.child import run_child
+from rig.background.messages import End, Failed, Order, Progress
 from rig.errors import StorageError
 from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.host.files import make_folder
-from rig.phrase import Phrase, from_plain, phrase, plain
+from rig.phrase import Phrase, phrase, plain
 from rig.settings.model import AnalysisSettings
 from service.measuring.keeping import keep_file, keep_problem, keep_renamed, keep_result, keep_step
+from service.measuring.program import Figures, Measure, Measured, NotMeasured, Rename, Whole
 from service.measuring.results import VIDEO, names_of
 from service.measuring.retries import source_mark
+from service.offloading.copying import Copy
 from service.offloading.notes import CopyNotes, as_warning, mark_of
 
 #: Where results are made, before they are whole.
@@ -48,7 +51,7 @@ class AfterSteps:
         busy: Callable[[], bool],
         earlier: Callable[[str], Sequence[Path]],
         wanted: Callable[[str], bool],
-        hear: Callable[[dict[str, Any]], None],
+        hear: Callable[[Progress], None],
         hold: Callable[[bool], None],
         tell: Callable[[Event], None],
         found: Callable[[tuple[LastJump, ...]], None],
@@ -76,38 +79,36 @@ class AfterSteps:
         try:
             make_folder(made.parent)
             shutil.rmtree(made, ignore_errors=True)
-            asked = {
-                "log": str(log),
-                "out": str(made),
-                "video": str(video) if wants_video else None,
-                "survey": analysis.survey and str(analysis.survey),
-                "calibration": analysis.calibration and str(analysis.calibration),
-                "earlier": [str(path) for path in self._earlier(recording)],
-            }
+            order = Measure(
+                log=log, out=made, survey=analysis.survey, calibration=analysis.calibration,
+                video=video if wants_video else None, earlier=tuple(self._earlier(recording)),
+            )  # fmt: skip
 
             found: tuple[LastJump, ...] = ()
 
-            def hear(news: dict[str, Any]) -> None:
+            def hear(news: Progress | Figures | Whole) -> None:
                 nonlocal found
-                if "jumps" in news:  # people wait for the figures, not for pages and pictures
-                    found = tuple(LastJump.model_validate(each | {"recording": recording}) for each in news["jumps"])
-                    self._found(found)
-                elif "whole" in news:  # nor for the video
-                    if log.exists():
-                        keep_result(made, log, found, names)
-                else:
-                    self._hear(news)
+                match news:
+                    case Figures():  # people wait for the figures, not for pages and pictures
+                        found = tuple(each.model_copy(update={"recording": recording}) for each in news.jumps)
+                        self._found(found)
+                    case Whole():  # nor for the video
+                        if log.exists():
+                            keep_result(made, log, found, names)
+                    case Progress():
+                        self._hear(news)
 
-            end = self._child(recording, "service.measuring.program", asked, hear)
+            says = Progress | Figures | Whole | Measured | NotMeasured
+            end = self._child(recording, "service.measuring.program", order, says, hear)
             if end is None or not log.exists():
                 return
-            if "problem" in end:
-                by_source = end.get("by_source", False)
-                self._fail(recording, log, from_plain(end["problem"]), source if by_source else None)
-            elif wants_video:
-                if end["no_video"] is None:
+            if isinstance(end, Failed):
+                by_source = isinstance(end, NotMeasured) and end.by_source
+                self._fail(recording, log, end.said, source if by_source else None)
+            elif wants_video and isinstance(end, Measured):
+                if end.no_video is None:
                     keep_file(video, log, VIDEO)
-                self._note(recording, log, AfterStep.VIDEO, end["no_video"])
+                self._note(recording, log, AfterStep.VIDEO, end.no_video)
         except StorageError as error:
             self._fail(recording, log, error.said)
         except (OSError, ValueError) as error:
@@ -121,18 +122,18 @@ class AfterSteps:
         Returns:
             Whether that is done.
         """
-        self._hear({"step": MeasuringStep.RENAMING, "share": 0.0})
+        self._hear(Progress(step=MeasuringStep.RENAMING, share=0.0))
         names, made = names_of(log), self._folder / _WORKSHOP / f"{recording}.renamed"
         try:
             make_folder(made.parent)
             shutil.rmtree(made, ignore_errors=True)
-            earlier = [str(path) for path in self._earlier(recording)]
-            asked = {"log": str(log), "result": str(measured_path(log)), "out": str(made), "earlier": earlier}
-            end = self._child(recording, "service.measuring.renaming", asked, self._hear)
+            earlier = tuple(self._earlier(recording))
+            order = Rename(log=log, result=measured_path(log), out=made, earlier=earlier)
+            end = self._child(recording, "service.measuring.program", order, End, self._hear)
             if end is None or not log.exists():
                 return False
-            if "problem" in end:
-                self._warn(_not_renamed(recording, from_plain(end["problem"])))
+            if isinstance(end, Failed):
+                self._warn(_not_renamed(recording, end.said))
                 return False
             keep_renamed(made, log, names)
         except (StorageError, OSError, ValueError) as error:
@@ -144,15 +145,15 @@ class AfterSteps:
 
     def copy(self, recording: str, log: Path, to: Path) -> None:
         """Copy a log, measured or not, with all that belongs to it; what failed is noted and told."""
-        self._hear({"step": MeasuringStep.COPYING, "share": 0.0})
+        self._hear(Progress(step=MeasuringStep.COPYING, share=0.0))
         mark, why = mark_of(log), None
-        asked = {"paths": [str(path) for path in (log, *beside(log))], "to": str(to)}
+        order = Copy(paths=(log, *beside(log)), to=to)
         try:
-            end = self._child(recording, "service.offloading.copying", asked, self._hear)
+            end = self._child(recording, "service.offloading.copying", order, Progress | End, self._hear)
             if end is None or not log.exists():
                 return
-            if (problem := end.get("problem")) is not None:
-                why = from_plain(problem)
+            if isinstance(end, Failed):
+                why = end.said
         except (OSError, ValueError) as error:
             why = plain(str(error))
         before = self._copies.of(recording)
@@ -160,15 +161,12 @@ class AfterSteps:
         if why is not None and (before is None or before.problem is None or before.problem.text != why.text):
             self._warn(_not_copied(recording, why))
 
-    def _child(
-        self, recording: str, module: str, asked: dict[str, Any], tell: Callable[[dict[str, Any]], None]
-    ) -> dict[str, Any] | None:
+    def _child(self, recording: str, module: str, order: Order, says: Any, tell: Callable[[Any], None]) -> End | None:
         wanted = partial(self._wanted, recording)
-        return run_child(module, asked, busy=self._busy, wanted=wanted, tell=tell, hold=self._hold)
+        return run_child(module, order, says, busy=self._busy, wanted=wanted, tell=tell, hold=self._hold)
 
-    def _note(self, recording: str, log: Path, step: AfterStep, problem: dict[str, Any] | None) -> None:
+    def _note(self, recording: str, log: Path, step: AfterStep, why: Phrase | None) -> None:
         """Note what came of a further step, and tell if it failed."""
-        why = None if problem is None else from_plain(problem)
         keep_step(log, step, None if why is None else as_warning(why))
         if why is not None:
             self._warn(phrase("event_no_video", "{recording} has no video: {why}", recording=recording, why=why))

@@ -14,7 +14,7 @@ from service.measuring.waiting import WaitingLogs
 from service.offloading.notes import CopyNotes
 
 #: So often recordings are looked for that are not on the other disk.
-_LOOK_S: Final = 300.0
+_UNCOPIED_LOOK_S: Final = 300.0
 
 
 class Copies:
@@ -49,7 +49,7 @@ class Copies:
             self._looked = None
             return
         now = time.monotonic()
-        if self._looked is not None and self._looked[0] == offload.to and now - self._looked[1] < _LOOK_S:
+        if self._looked is not None and self._looked[0] == offload.to and now - self._looked[1] < _UNCOPIED_LOOK_S:
             return
         self._looked = offload.to, now
         for log in sorted(self._folder.glob("*.mcap")):

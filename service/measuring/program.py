@@ -1,71 +1,139 @@
-"""The program that measures one log, started by `service.measuring.after_steps`."""
+"""The program that measures one log, or writes a corrected name into its result; started by `after_steps`."""
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from analysis.procedure.steps import STEPS
+from rig.api.jump import LastJump
 from rig.api.measuring import MeasuringStep
+from rig.background.messages import End, Failed, Order, Progress
 from rig.background.program import Teller, serve
 from rig.errors import BadInputError, LogDamagedError, SvevError
-from rig.phrase import as_plain
+from rig.phrase import Phrase
+from rig.transport.message import Message
+
+if TYPE_CHECKING:
+    from analysis.report.kinogram.earlier import EarlierJump
 
 
-def _measure(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
-    """Measure `log` by `survey` or `calibration` into the folder `out`, then draw the `video`, unless it is null.
+class Measure(Order):
+    """Measure a log by survey or calibration into the folder `out`, then draw the video, unless it is None.
 
-    Tells the main figures of the jumps before it writes anything, and when the folder is whole; says at the end why
-    there is no video, or why the log cannot be measured, and whether survey or poses are the reason: they cannot be
-    read, or do not fit its balls.
+    Attributes:
+        earlier: the `kinogram.json` of other measured logs of the athlete; `service.recordings.measured_jumps` says
+            which.
     """
+
+    log: Path
+    out: Path
+    survey: Path | None
+    calibration: Path | None
+    video: Path | None
+    earlier: tuple[Path, ...]
+
+
+class Figures(Message):
+    """The main figures of the jumps; nothing is written yet."""
+
+    jumps: tuple[LastJump, ...]
+
+
+class Whole(Message):
+    """The folder is whole."""
+
+
+class Measured(End):
+    """The log is measured; why there is no video, if one was to be drawn and could not be."""
+
+    no_video: Phrase | None = None
+
+
+class NotMeasured(Failed):
+    """The log cannot be measured; `by_source`: survey or poses cannot be read, or do not fit its balls."""
+
+    by_source: bool
+
+
+class Rename(Order):
+    """Write those files of the result of a log into the folder `out` that say whose jump it is; `earlier` as above."""
+
+    log: Path
+    result: Path
+    out: Path
+    earlier: tuple[Path, ...]
+
+
+def _measure(asked: Measure, tell: Teller) -> End:
     from analysis.cameras.source import read_source  # noqa: PLC0415 - its libraries start their threads with our low priority
     from analysis.procedure.analyze import analyze  # noqa: PLC0415
     from analysis.procedure.result_folder import write_folder  # noqa: PLC0415
     from analysis.worker.findings import summary  # noqa: PLC0415
-    from service.measuring.earlier import earlier_jumps  # noqa: PLC0415
 
     orienting = False
 
     def progress(step: str, share: float) -> None:
         nonlocal orienting
         orienting = STEPS[step] is MeasuringStep.BALLS and share < 1.0
-        tell(last=share in {0.0, 1.0}, step=STEPS[step], share=share)
+        tell(Progress(step=STEPS[step], share=share), last=share in {0.0, 1.0})
 
-    log, out = Path(asked["log"]), Path(asked["out"])
-    survey, calibration = (Path(asked[key]) if asked[key] else None for key in ("survey", "calibration"))
     try:
-        source = read_source(survey, calibration)
+        source = read_source(asked.survey, asked.calibration)
     except BadInputError as error:
-        return _failed(error, by_source=True)
+        return NotMeasured(said=error.said, by_source=True)
     try:
-        found = analyze(log, source, progress=progress)
+        found = analyze(asked.log, source, progress=progress)
     except LogDamagedError:
         raise
     except SvevError as error:
-        return _failed(error, by_source=orienting)
+        return NotMeasured(said=error.said, by_source=orienting)
     result = found.result
-    jumps = [
+    jumps = tuple(
         summary(result.recording, result.rate_hz, jump, found.perpendicular.get(jump.number)) for jump in result.jumps
-    ]
-    tell(last=True, jumps=[jump.model_dump(mode="json") for jump in jumps])
-    write_folder(found, log, out, earlier=earlier_jumps(asked["earlier"]), progress=progress)
-    tell(last=True, whole=True)
-    if asked["video"] is None:
-        return {}
+    )
+    tell(Figures(jumps=jumps), last=True)
+    write_folder(found, asked.log, asked.out, earlier=_earlier(asked.earlier), progress=progress)
+    tell(Whole(), last=True)
+    if asked.video is None:
+        return Measured()
     from analysis.report.video import write_video  # noqa: PLC0415 - its libraries, when the figures are told
 
+    def drawn(done: int, of: int) -> None:
+        tell(Progress(step=MeasuringStep.VIDEO, share=done / max(1, of)))
+
     try:
-        write_video(
-            result, found.measurements, found.system, log, Path(asked["video"]),
-            progress=lambda done, of: tell(step=MeasuringStep.VIDEO, share=done / max(1, of)),
-        )  # fmt: skip
+        write_video(result, found.measurements, found.system, asked.log, asked.video, progress=drawn)
     except SvevError as error:
-        return {"no_video": as_plain(error.said)}
-    return {"no_video": None}
+        return Measured(no_video=error.said)
+    return Measured()
 
 
-def _failed(error: SvevError, *, by_source: bool) -> dict[str, Any]:
-    return {"problem": as_plain(error.said), "by_source": by_source}
+def _rename(asked: Rename, _: Teller) -> End:
+    from analysis.procedure.renaming import write_renamed  # noqa: PLC0415 - as above
+    from recorder.log.session_changes import session_changes  # noqa: PLC0415
+
+    changes = session_changes(asked.log)
+    write_renamed(asked.result, asked.log, asked.out, changes, earlier=_earlier(asked.earlier))
+    return End()
+
+
+def _earlier(files: Iterable[Path]) -> "list[EarlierJump]":
+    """The jumps of `kinogram.json` files; what is broken beside another log does not hinder the measuring of this."""
+    from analysis.report.kinogram.earlier import read_earlier  # noqa: PLC0415
+
+    found: list[EarlierJump] = []
+    for file in files:
+        try:
+            found += read_earlier(file)
+        except BadInputError:
+            continue
+    return found
+
+
+def main() -> None:
+    """Measure one log, or rename its jumper."""
+    serve({Measure: _measure, Rename: _rename})
 
 
 if __name__ == "__main__":
-    serve(_measure)
+    main()

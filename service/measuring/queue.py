@@ -18,6 +18,7 @@ from recorder.log.write_lock import is_being_written
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, Measurement, MeasuringQueue, MeasuringState, MeasuringStep, StepState
 from rig.api.statement import Level, Statement
+from rig.background.messages import Progress
 from rig.errors import NoAnalysisError, StateForbidsError
 from rig.events import Event
 from rig.events import Level as EventLevel
@@ -30,16 +31,16 @@ from service.measuring.retries import Retries
 from service.measuring.waiting import WaitingLogs
 from service.offloading.releasing import Releasing, Removal
 
-_LOOK_S: Final = 0.2
+_QUEUE_LOOK_S: Final = 0.2
 #: So often survey or poses are looked at while nothing waits.
-_WATCH_S: Final = 2.0
+_SOURCE_LOOK_S: Final = 2.0
 #: Share of a step.
-_SEEN: Final = 0.05
-_END_S: Final = 10.0
+_SEEN_SHARE: Final = 0.05
+_THREAD_ENDS_S: Final = 10.0
 #: What is at work in these steps; in all others the log is measured.
 _AT_WORK: Final = {MeasuringStep.VIDEO: AfterStep.VIDEO}
 #: Why nothing can be measured, and what to do.
-_UNKNOWN: Final = (
+_NO_SOURCE: Final = (
     "nothing says where the balls are: give the rig file an [analysis] with survey or calibration, and restart the "
     "service"
 )
@@ -95,7 +96,7 @@ class Measurings:
     def __exit__(self, *_: object) -> None:
         self._closed.set()
         self._bell.set()
-        self._thread.join(_END_S)
+        self._thread.join(_THREAD_ENDS_S)
 
     def opened(self, log: Path) -> None:
         """Note that a recording writes this log; when it is closed that is done with it which the rig file asks for.
@@ -130,7 +131,7 @@ class Measurings:
             StateForbidsError: too many are waiting.
         """
         if self._in_use().analysis is None:
-            raise NoAnalysisError(_UNKNOWN)
+            raise NoAnalysisError(_NO_SOURCE)
         self._waiting.add(recording)
         self._bell.set()
         self._changed()
@@ -148,7 +149,7 @@ class Measurings:
         ids, running = self._waiting.ids, self._running
         known = measurement_of(recording, log)  # what left the queue before is there
         if self._in_use().analysis is None:
-            what, _, advice = _UNKNOWN.partition(": ")
+            what, _, advice = _NO_SOURCE.partition(": ")
             refused = Statement(level=Level.INFO, code="no_analysis", text=what, advice=advice)
             known = known.model_copy(update={"refused": refused})
         copy = self._copies.step(recording, running)
@@ -212,7 +213,7 @@ class Measurings:
                 self._copy(recording)
             elif not self._release():
                 waiting = self._waiting.ids or self._names.ids or self._copies.waiting.ids
-                self._bell.wait(_LOOK_S if waiting else _WATCH_S)
+                self._bell.wait(_QUEUE_LOOK_S if waiting else _SOURCE_LOOK_S)
                 self._bell.clear()
                 continue
             self._changed()
@@ -317,11 +318,11 @@ class Measurings:
         self._found(jumps)
         self._changed()
 
-    def _hear(self, news: dict[str, Any]) -> None:
+    def _hear(self, news: Progress) -> None:
         """Enter how far the program is; in steps that somebody would see, since everybody is told of each."""
-        step, share, known = MeasuringStep(news["step"]), float(news["share"]), self.view
-        if step is not known.step or share >= known.share + _SEEN:
-            self._change(step=step, share=share)
+        known = self.view
+        if news.step is not known.step or news.share >= known.share + _SEEN_SHARE:
+            self._change(step=news.step, share=news.share)
 
     def _change(self, **what: Any) -> None:
         with self._lock:

@@ -14,7 +14,7 @@ from rig.host.files import TEXT_MAX, read_whole
 from rig.phrase import Phrase, phrase
 
 NAME: Final = ".svev-measuring.json"
-_MOST: Final = 2000
+_MOST_LOGS: Final = 2000
 _IDS: Final = TypeAdapter(list[str])
 
 
@@ -50,12 +50,12 @@ class WaitingLogs:
         with self._lock:
             if recording in self._ids:
                 return
-            if len(self._ids) >= _MOST:
+            if len(self._ids) >= _MOST_LOGS:
                 raise StateForbidsError(
                     phrase(
                         "measuring_queue_full",
                         "{count} logs are waiting already: wait until some are measured",
-                        count=_MOST,
+                        count=_MOST_LOGS,
                     )
                 )
             self._ids.insert(0 if first else len(self._ids), recording)
@@ -79,7 +79,7 @@ class WaitingLogs:
             return
         with self._lock:
             self._ids += [recording for recording in before if recording not in self._ids]
-            del self._ids[_MOST:]
+            del self._ids[_MOST_LOGS:]
 
     def keep(self) -> None:
         """Write the file, if anything has changed."""

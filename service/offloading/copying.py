@@ -1,4 +1,4 @@
-"""The program that copies a log and all that belongs to it elsewhere, started by `service.measuring.queue`.
+"""The program that copies a log and all that belongs to it elsewhere, and that reads both once more later.
 
 A log counts as copied when it was read back from the other disk and its checksum stands beside it, in the form that
 `sha256sum --check` reads.
@@ -7,9 +7,10 @@ A log counts as copied when it was read back from the other disk and its checksu
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from rig.api.measuring import MeasuringStep
+from rig.background.messages import End, Order, Progress
 from rig.background.program import Teller, serve
 from rig.errors import StorageError
 from rig.host.disk import ask_free_bytes, replace_file, sync
@@ -19,14 +20,26 @@ from service.offloading.verified_copy import checksum, copy_file, sum_of
 _LOG: Final = ".mcap"
 
 
-def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
-    """Copy the files and folders of `paths` into the folder `to`, each whole or absent; what is there already stays."""
-    to = Path(asked["to"])
+class Copy(Order):
+    """Copy files and folders into the folder `to`, each whole or absent; what is there already stays."""
+
+    paths: tuple[Path, ...]
+    to: Path
+
+
+class Confirm(Order):
+    """Compare a log, its copy and the checksum beside the copy; if they differ, the copy loses its checksum."""
+
+    log: Path
+    copy: Path
+
+
+def _copy(asked: Copy, tell: Teller) -> End:
+    to = asked.to
     if not to.is_dir():
         text = "{folder}: the folder for copies is not there; connect its disk, and the copy is made"
         raise StorageError(phrase("copying_no_folder", text, folder=str(to)))
-    sources = [Path(each) for each in asked["paths"]]
-    wanted = [source for source in sources if source.exists() and not _is_copied(source, to / source.name)]
+    wanted = [source for source in asked.paths if source.exists() and not _is_copied(source, to / source.name)]
     sizes = sum(path.stat().st_size for source in wanted for path in _files(source))
     there = sum(part.stat().st_size for source in wanted if (part := _part(source, to)).is_file())
     if ask_free_bytes(to) < sizes - there:
@@ -43,15 +56,26 @@ def _copy(asked: dict[str, Any], tell: Teller) -> dict[str, Any]:
     def told(count: int) -> None:
         nonlocal done
         done += count
-        tell(step=MeasuringStep.COPYING, share=done / (2 * sizes))
+        tell(Progress(step=MeasuringStep.COPYING, share=done / (2 * sizes)))
 
     for source in wanted:
         if source.suffix == _LOG and (to / source.name).exists():
-            _confirm(source, to / source.name, told)
+            _accept(source, to / source.name, told)
         else:
             _copy_one(source, to, told)
     sync(to)
-    return {}
+    return End()
+
+
+def _confirm(asked: Confirm, _: Teller) -> End:
+    wanted = sum_of(asked.copy).read_text().partition(" ")[0]
+    for path in (asked.log, asked.copy):
+        if checksum(path, lambda _: None) != wanted:
+            sum_of(asked.copy).unlink()
+            raise StorageError(
+                f"{asked.copy}: is not what was copied there any more; move it away, and the recording is copied again"
+            )
+    return End()
 
 
 def _copy_one(source: Path, to: Path, told: Callable[[int], None]) -> None:
@@ -71,7 +95,7 @@ def _copy_one(source: Path, to: Path, told: Callable[[int], None]) -> None:
         _keep_sum(target, digest)
 
 
-def _confirm(source: Path, target: Path, told: Callable[[int], None]) -> None:
+def _accept(source: Path, target: Path, told: Callable[[int], None]) -> None:
     """Compare a log with a copy that has no checksum beside it: of an earlier version, or of somebody else.
 
     Raises:
@@ -122,5 +146,10 @@ def _rename(part: Path, target: Path) -> None:
     part.replace(target)
 
 
+def main() -> None:
+    """Copy, or confirm a copy."""
+    serve({Copy: _copy, Confirm: _confirm})
+
+
 if __name__ == "__main__":
-    serve(_copy)
+    main()

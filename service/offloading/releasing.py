@@ -7,15 +7,17 @@ from pathlib import Path
 from typing import Final
 
 from rig.background.child import run_child
+from rig.background.messages import End, Failed
 from rig.errors import SvevError
 from rig.events import Event, Level
 from rig.host.disk import free_bytes
-from rig.phrase import Phrase, from_plain, phrase, plain
+from rig.phrase import Phrase, phrase, plain
 from rig.settings.model import OffloadSettings, RigSettings
+from service.offloading.copying import Confirm
 from service.offloading.notes import CopyNotes, as_warning, mark_of
 from service.offloading.verified_copy import sum_of
 
-_LOOK_S: Final = 60.0
+_RULES_LOOK_S: Final = 60.0
 _DAY_S: Final = 86400.0
 _GB: Final = 1e9
 
@@ -66,7 +68,7 @@ class Releasing:
         for log in self._let_go(offload):
             if self._is_safe(log, offload.to / log.name):
                 return log
-        self._next_look = time.monotonic() + _LOOK_S
+        self._next_look = time.monotonic() + _RULES_LOOK_S
         return None
 
     def release(self, log: Path, busy: Callable[[], bool], wanted: Callable[[], bool]) -> None:
@@ -80,16 +82,13 @@ class Releasing:
         offload = self._in_use().offload
         if offload is None:
             return
-        asked = {"log": str(log), "copy": str(offload.to / log.name)}
+        order = Confirm(log=log, copy=offload.to / log.name)
         try:
-            end = run_child(
-                "service.offloading.confirming", asked,
-                busy=busy, wanted=wanted, tell=lambda _: None, hold=lambda _: None,
-            )  # fmt: skip
+            end = run_child("service.offloading.copying", order, End, busy=busy, wanted=wanted)
             if end is None:
                 return
-            if (problem := end.get("problem")) is not None:
-                self._kept(log, from_plain(problem))
+            if isinstance(end, Failed):
+                self._kept(log, end.said)
                 return
             if not self._notes.is_copied(log):  # changed meanwhile
                 return
@@ -133,7 +132,7 @@ class Releasing:
 
     def _kept(self, log: Path, why: Phrase) -> None:
         """Say why a recording stays, and let it be copied again."""
-        self._next_look = time.monotonic() + _LOOK_S
+        self._next_look = time.monotonic() + _RULES_LOOK_S
         self._notes.note(log, mark_of(log), as_warning(why))
         said = phrase("event_not_released", "{recording} is not released: {why}", recording=log.stem, why=why)
         self._tell(Event.now(Level.WARNING, "service", said))

@@ -16,7 +16,7 @@ from rig.errors import SvevError
 from rig.transport.recorder_commands import GoesOn, StartRecording
 
 #: A disk from which the log is not read within this time hangs.
-READ_S: Final = 10.0
+LOG_READ_S: Final = 10.0
 #: A recorder that dies so often within so many seconds would die again.
 DEATHS_MAX: Final = 3
 DEATHS_WITHIN_S: Final = 60.0

@@ -30,7 +30,7 @@ _FRESH_S: Final = 600.0
 _LOOK_S: Final = 5.0
 _LAST_S: Final = 3 * _LOOK_S
 #: A disk that hangs is not waited for longer.
-_END_S: Final = 2.0
+_THREAD_ENDS_S: Final = 2.0
 _GB: Final = 1e9
 
 
@@ -67,7 +67,7 @@ class TrashKeeper:
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
-        self._thread.join(_END_S)
+        self._thread.join(_THREAD_ENDS_S)
 
     def counted_in(self, status: Status) -> Status:
         """A status whose room counts what the trash holds: it is made free when it is needed."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery
 from rig.api.comparison import Comparison, Span
+from rig.api.export import ExportJob
 from rig.api.looking import Moment, Note, VoiceNote
 from rig.api.measuring import Measurement
 from rig.api.recordings import Pulses, Recording, RecordingQuery, SessionChange, Trash
@@ -176,4 +177,29 @@ class Archive(Protocol):
 
     def remove_voice_note(self, recording_id: str, number: int) -> list[VoiceNote]:
         """Remove a spoken note for good; if there is none of this number, nothing changes."""
+        ...
+
+
+class Exports(Protocol):
+    """Exports of recordings: one is made after the other, and none while a recording runs.
+
+    Raises (each where it applies):
+        UnknownExportError: there is none of this id.
+        StateForbidsError: it is not done.
+    """
+
+    def jobs(self) -> list[ExportJob]:
+        """All that are kept, newest first."""
+        ...
+
+    def job(self, job_id: str) -> ExportJob:
+        """One of them."""
+        ...
+
+    def file(self, job_id: str) -> Path:
+        """The file of one that is done."""
+        ...
+
+    def remove(self, job_id: str) -> ExportJob:
+        """Remove one and its file; one that is not done is given up."""
         ...

@@ -1,11 +1,13 @@
-"""The part of the seam that is about single cameras and their pictures."""
+"""The part of the seam that is about single cameras: their pictures, and how they are calibrated by them."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.api.calibrating import Calibrating, CalibratingOrder
 from rig.api.cameras.aids import CameraAids
 from rig.api.cameras.balls import CameraBalls
 from rig.api.cameras.light import CameraLight, LightChange
@@ -82,4 +84,42 @@ class Cameras(Protocol):
         UnknownCameraError: no such camera. BadInputError: out of range. StateForbidsError: a recording runs.
         StorageError: the rig file cannot be written.
         """
+        ...
+
+
+class CalibrationHelper(Protocol):
+    """Takes pictures of a target while somebody moves it, and computes a calibration. Any thread may call any method.
+
+    Raises (each where it applies):
+        StateForbidsError: there are no pictures, or no calibration yet, or a recording runs.
+        BadInputError: a camera has no calibration.
+        StorageError: pictures or rig file cannot be written.
+    """
+
+    def view(self) -> Calibrating:
+        """What it does and has; who asks keeps it going."""
+        ...
+
+    def begin(self, order: CalibratingOrder) -> Calibrating:
+        """Look at live pictures and keep those that are wanted."""
+        ...
+
+    def end(self) -> Calibrating:
+        """Look no more, or give up computing; the pictures stay."""
+        ...
+
+    def undo(self) -> Calibrating:
+        """Remove the pictures that were kept last."""
+        ...
+
+    def compute(self) -> Calibrating:
+        """Compute a calibration from the pictures."""
+        ...
+
+    def save(self) -> Calibrating:
+        """Put the calibration into the rig file, and into all logs from now on."""
+        ...
+
+    def protocol(self) -> Path:
+        """The protocol of the calibration."""
         ...

@@ -12,10 +12,8 @@ from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, Event, RigView, Status
 from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
 from rig.phrase import Phrase
-from service.seam.archive import Archive
-from service.seam.calibrating import CalibrationHelper
-from service.seam.cameras import Cameras
-from service.seam.exports import Exports
+from service.seam.archive import Archive, Exports
+from service.seam.cameras import CalibrationHelper, Cameras
 from service.seam.start_list import Jumpers
 
 

@@ -25,7 +25,7 @@ from service.recordings.in_progress import Outcome, RecordingInProgress
 from service.recordings.interruption import (
     DEATHS_MAX,
     DEATHS_WITHIN_S,
-    READ_S,
+    LOG_READ_S,
     Interruption,
     died_too_often,
     going_on,
@@ -285,7 +285,7 @@ def interrupt(now: Situation, error: SvevError, at: Moment, do: Do) -> tuple[Sit
         said = phrase("why_died_often", text, times=DEATHS_MAX, seconds=DEATHS_WITHIN_S, why=error.said)
         return _with(now, current), ProcessDiedError(said)
     do(ReadLog(current.path, current.ids[0]))
-    return _with(now, replace(current, interruption=Interruption(error, at.s + READ_S))), None
+    return _with(now, replace(current, interruption=Interruption(error, at.s + LOG_READ_S))), None
 
 
 def read(now: Situation, current: RecordingInProgress, news: LogRead, _: Moment, __: Do) -> Situation:

@@ -22,8 +22,8 @@ from rig.settings.model import RigSettings
 from rig.transport.recorder_commands import RecorderOptions
 from service.jumpers.book import JumperBook
 from service.processes.rig_session import RigSession, StartHill
-from service.recordings.calibration import read_calibration
 from service.recordings.truth import TruthWriter
+from service.rig_file import read_calibration
 from service.status.event_hub import EventHub
 from service.supervision.commands import Commands
 from service.supervision.decide import decide, is_over
@@ -34,7 +34,7 @@ from service.supervision.world import World
 
 T = TypeVar("T")
 _TURN_S: Final = 0.2
-_FINISH_S: Final = 4.0
+_RECORDING_ENDS_S: Final = 4.0
 
 
 @dataclass(slots=True)
@@ -134,7 +134,7 @@ class Supervisor:
 
     def begin_stop(self) -> None:
         """Begin to end: finish a recording, then stop everything. May be called from a signal handler, and again."""
-        self._commands.end_by(time.monotonic() + _FINISH_S)
+        self._commands.end_by(time.monotonic() + _RECORDING_ENDS_S)
 
     def stop(self, timeout_s: float) -> None:
         """Finish a recording, stop all processes, wait for the end of the thread.

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from rig.errors import BadInputError
 from rig.settings.model import RigSettings
-from service.recordings.calibration import read_calibration
+from service.rig_file import read_calibration
 from svev.doctor.finding import Finding, Topic, failure, passed
 
 

@@ -28,7 +28,6 @@ from rig.phrase import Phrase, phrase, plain
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
 from rig.settings.webhook import WebhookSettings
-from rig.transport.launcher import program_command
 from rig.transport.preview import PreviewSlot
 from rig.transport.recorder_commands import RecorderOptions
 from service.aiming.balls import BallPlaces
@@ -77,7 +76,7 @@ _HOUR_S: Final = 3600.0
 #: At the end the disk gets so long to take the last login or logout.
 _KEEP_S: Final = 1.0
 #: The program that makes a rehearsal.
-REHEARSE: Final = program_command("svev.serving.rehearsal_program")
+REHEARSE: Final = "svev.serving.rehearsal_program"
 #: Ctrl-C, systemd, and a terminal or an ssh session that is closed.
 
 

@@ -46,7 +46,7 @@ class PanelDoctor:
                 return self._report
             findings = list(self._look(status, interrupted, idle=idle))
             worst = max((finding.level for finding in findings), key=_RANK.index)
-            self._report = models.DoctorReport(worst=worst.value, findings=tuple(_shown(each) for each in findings))
+            self._report = models.DoctorReport(worst=worst.value, findings=tuple(shown(each) for each in findings))
             self._key = (idle, time.monotonic() + _KEPT_S)
             return self._report
 
@@ -93,7 +93,8 @@ def _room_of(status: Status) -> Finding:
     return passed(Topic.DISK, "check_room_armed", what, gb=gb, jumps=jumps, jump_s=jump_s)
 
 
-def _shown(finding: Finding) -> models.Finding:
+def shown(finding: Finding) -> models.Finding:
+    """A finding as the REST API has it."""
     return models.Finding(
         level=finding.level.value,
         topic=finding.topic.value,

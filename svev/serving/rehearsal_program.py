@@ -1,70 +1,64 @@
-"""The program that rehearses for the service: started by `service.rehearsals`, told and telling by lines of JSON.
+"""The program that rehearses for the service, started by `service.rehearsals`.
 
-The first line of standard input says what to rehearse. Its end, which is also that of the service, ends the rehearsal:
-cameras are closed and the log is deleted.
+When the service tells it to end, or has ended, the rehearsal ends: cameras are closed and the log is deleted.
 """
 
-import json
-import os
-import signal
-import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
+from typing import Final
 
 from recorder.publishing.keys import check_publication
-from rig.api.status import RehearsalStage
+from rig.api.status import RehearsalProgress, RehearsalStage
 from rig.errors import SvevError
-from rig.host.endings import counted_endings, leave_terminal_to_parent
 from rig.phrase import plain
-from rig.settings.model import RigSettings
+from rig.transport.child import ChildContext, begin
+from rig.transport.message import Quit
+from service.rehearsals import NoVerdict, RehearsalGoes, Rehearse, Rehearsed
 from svev.rehearsal import rehearse
+from svev.serving.panel_doctor import shown
+
+#: To close the cameras and delete the log.
+_GRACE_S: Final = 5.0
 
 
 def main() -> None:
     """Rehearse once."""
-    leave_terminal_to_parent()
-    asked = json.loads(sys.stdin.readline())
-    # A rehearsal that is interrupted is not wanted any more.
-    with counted_endings((signal.SIGTERM,)) as asks, suppress(KeyboardInterrupt):
-        threading.Thread(target=_await_end, daemon=True).start()
+    child = begin(Rehearse, Quit, _GRACE_S)
+    with suppress(KeyboardInterrupt):  # a rehearsal that is interrupted is not wanted any more
         try:
-            rig = RigSettings.model_validate(asked["rig"])
-            check_publication(rig.network)
-            done = rehearse(
-                rig, asked["toml"], Path(asked["directory"]), asked["seconds"], lambda _: None, _progress, asks
-            )
+            child.control.send(_rehearsed(child))
         except SvevError as error:
-            _say({"problem": asdict(error.said)})
+            child.control.send(NoVerdict(said=error.said))
         except OSError as error:
-            _say({"problem": asdict(plain(f"{error.filename or 'system call'}: {error.strerror}"))})
-        else:
-            _say({"rehearsed": done.to_json()})
+            child.control.send(NoVerdict(said=plain(f"{error.filename or 'system call'}: {error.strerror}")))
 
 
-def _await_end() -> None:
-    os.read(sys.stdin.fileno(), 1)
-    os.kill(os.getpid(), signal.SIGTERM)
+def _rehearsed(child: ChildContext[Rehearse]) -> Rehearsed:
+    @contextmanager
+    def progress(_: str, pulses: int | None) -> Iterator[Callable[[int], None]]:
+        """Say how far the recording is; behind it, the log is read."""
 
+        def say(done: int, stage: RehearsalStage = RehearsalStage.RECORDING) -> None:
+            child.control.send(RehearsalGoes(progress=RehearsalProgress(stage=stage, done=done, pulses=pulses or 0)))
 
-@contextmanager
-def _progress(_: str, pulses: int | None) -> Iterator[Callable[[int], None]]:
-    """Say how far the recording is; behind it, the log is read."""
+        say(0)
+        yield say
+        say(pulses or 0, RehearsalStage.READING)
 
-    def say(done: int) -> None:
-        _say({"stage": RehearsalStage.RECORDING, "done": done, "pulses": pulses or 0})
-
-    say(0)
-    yield say
-    _say({"stage": RehearsalStage.READING, "done": pulses or 0, "pulses": pulses or 0})
-
-
-def _say(what: dict[str, Any]) -> None:
-    sys.stdout.write(json.dumps(what) + "\n")
-    sys.stdout.flush()
+    asked = child.config
+    check_publication(asked.rig.network)
+    done = rehearse(
+        asked.rig, asked.toml, asked.directory, asked.seconds, lambda _: None, progress, lambda: int(child.stopping())
+    )
+    return Rehearsed(
+        verdict=done.verdict,
+        pulses=done.pulses,
+        complete=done.complete,
+        headroom=done.headroom,
+        jumps=done.jumps,
+        spread_us=None if done.spread_us is None else done.spread_us["median"],
+        findings=tuple(map(shown, done.findings)),
+    )
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from rig.errors import StateForbidsError
 
 
 class MemoryCalibrating:
-    """See `service.seam.calibrating.CalibrationHelper`.
+    """See `service.seam.cameras.CalibrationHelper`.
 
     Attributes:
         shown: what `view` says.

@@ -1,4 +1,4 @@
-"""The routes of recordings: start and stop, list, change, delete and restore."""
+"""The routes of recordings and of the trash: start and stop, list, change, delete and restore, remove for good."""
 
 from http import HTTPStatus
 from typing import Annotated, Final
@@ -8,7 +8,15 @@ from pydantic import TypeAdapter
 
 from rig.api.automatic import AutomaticChange, JumpMark, Marked
 from rig.api.fields import LONGEST_LINE, LONGEST_TAG
-from rig.api.recordings import Recording, RecordingOrder, RecordingQuery, SessionChange, Sorting, StopOrder
+from rig.api.recordings import (
+    Recording,
+    RecordingOrder,
+    RecordingQuery,
+    SessionChange,
+    Sorting,
+    StopOrder,
+    Trash,
+)
 from rig.api.statement import Level
 from rig.api.status import Status
 from service.seam.rig import RigService
@@ -146,6 +154,32 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         recording = service.restore_recording(recording_id)
         changes.recordings_changed()
         return recording
+
+    return router
+
+
+def trash_router(service: RigService, changes: Changes) -> APIRouter:
+    """The routes of the trash."""
+    router = strict_router("Recordings")
+
+    @router.get("/trash")
+    def get_trash() -> Trash:
+        """How much lies in the trash. What lies there: `GET /recordings?deleted=true`."""
+        return service.trash()
+
+    @router.delete("/trash", responses=CHANGING)
+    def empty_trash() -> Trash:
+        """Empty the trash: what was deleted is removed for good, which frees its room. Answers what was removed."""
+        gone = service.empty_trash()
+        changes.recordings_changed()
+        return gone
+
+    @router.delete("/trash/{recording_id}", responses=CHANGING | refusals(404))
+    def remove_recording(recording_id: RecordingId) -> Trash:
+        """Remove one recording for good; it must lie in the trash."""
+        gone = service.remove_recording(recording_id)
+        changes.recordings_changed()
+        return gone
 
     return router
 

@@ -1,16 +1,19 @@
-"""The routes of the rig as a whole: status, arm and disarm, the rig file, the doctor."""
+"""The routes of the rig as a whole: status, arm and disarm, alarms, the rig file, the doctor."""
 
 from http import HTTPStatus
+from typing import Annotated
 
 import anyio
 from anyio.to_thread import run_sync
-from fastapi import APIRouter
+from fastapi import APIRouter, Path
 
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, RigView, Status
 from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
 from service.seam.rig import RigService
 from webpanel.routes.common import CHANGING, NoFields, refusals, strict_router
+
+AlarmNumber = Annotated[int, Path(ge=1, le=2**31 - 1, description="`number` of the alarm", examples=[1])]
 
 
 def rig_router(service: RigService) -> APIRouter:
@@ -97,5 +100,17 @@ def rig_router(service: RigService) -> APIRouter:
     def end_rehearsal() -> Rehearsals:
         """End the rehearsal that runs, without a verdict; answers when the cameras are free."""
         return service.end_rehearsal()
+
+    return router
+
+
+def alarms_router(service: RigService) -> APIRouter:
+    """The routes about alarms."""
+    router = strict_router("Rig")
+
+    @router.post("/alarms/{number}/acknowledge", responses=CHANGING | refusals(404))
+    def acknowledge(number: AlarmNumber, _: NoFields = None) -> Status:
+        """Note that somebody has seen an alarm: it stays, silent on all pages, until it ends or gets worse."""
+        return service.acknowledge(number)
 
     return router

@@ -7,13 +7,13 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from analysis.cameras.source import Source
 from analysis.measurements.model import Measurements
 from rig.api.digitizing import CurvePoint, HandResult
-from rig.api.measuring import MeasuringStep
 from rig.background.errands import Errands
+from rig.background.messages import Progress
 from rig.phrase import Phrase
 
 _SUFFIX: Final = ".result"
@@ -106,7 +106,7 @@ class Computing:
         return HandResult(state="done", said=computed.said, curves=computed.curves, files=computed.files)
 
 
-def _heard(state: HandResult, news: dict[str, Any]) -> HandResult:
-    if "step" in news:
-        news["step"] = MeasuringStep(news["step"])
-    return state.model_copy(update=news)
+def _heard(state: HandResult, news: Progress | bool) -> HandResult:
+    if isinstance(news, bool):
+        return state.model_copy(update={"paused": news})
+    return state.model_copy(update={"step": news.step, "share": news.share})

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from analysis.procedure.steps import STEPS
 from rig.background.errands import run_errand
+from rig.background.messages import Progress
 from rig.background.program import Teller
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ def _compute(order: "JumpOrder", folder: Path, tell: Teller) -> "ComputedJump":
     from analysis.procedure.result_folder import write_folder  # noqa: PLC0415
 
     def progress(step: str, share: float) -> None:
-        tell(last=share in {0.0, 1.0}, step=STEPS[step], share=share)
+        tell(Progress(step=STEPS[step], share=share), last=share in {0.0, 1.0})
 
     found = analyze(order.log, order.source, by_hand=order.measurements, images=False, progress=progress)
     files = write_folder(found, order.log, folder / RESULT, progress=progress)
@@ -26,5 +27,10 @@ def _compute(order: "JumpOrder", folder: Path, tell: Teller) -> "ComputedJump":
     return ComputedJump(said, curves_of(found.result), tuple(sorted(file.name for file in files)))
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Do one errand."""
     run_errand(_compute)
+
+
+if __name__ == "__main__":
+    main()

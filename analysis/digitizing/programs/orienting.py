@@ -6,7 +6,7 @@ A program of its own does it, so that measuring goes on as fast as before; while
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from analysis.scene.camera_system import CameraSystem
 from analysis.scene.survey import KnownPoints, Survey
 from rig.api.digitizing import OrientationState, PredictedPoint
 from rig.background.errands import Errands
+from rig.background.messages import Progress
 from rig.errors import BadInputError
 from rig.phrase import Phrase, phrase
 
@@ -152,8 +153,8 @@ class Orienting:
         return _Known(state, system, cameras.by_clicks, _proposals(system, self.balls))
 
 
-def _heard(known: _Known, news: dict[str, Any]) -> _Known:
-    message = _RECORDING if news.get("paused") else None
+def _heard(known: _Known, news: Progress | bool) -> _Known:
+    message = _RECORDING if news is True else None
     return replace(known, state=OrientationState(state="working", message=message))
 
 

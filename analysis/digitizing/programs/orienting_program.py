@@ -33,5 +33,10 @@ def _orient(order: "OrientingOrder", _: Path, __: Teller) -> "OrientedCameras":
     return OrientedCameras(system, tuple(map(plain, notes)), by_clicks=True)
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Do one errand."""
     run_errand(_orient)
+
+
+if __name__ == "__main__":
+    main()

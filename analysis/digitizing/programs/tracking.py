@@ -6,7 +6,6 @@ A program of its own follows, so that measuring goes on as fast as before; while
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from analysis.digitizing.following.follow import require_marked
 from analysis.digitizing.following.pursuit import Found
@@ -16,6 +15,7 @@ from analysis.measurements.model import Measurements
 from analysis.scene.camera_system import CameraSystem
 from rig.api.digitizing import MarkSource, Tracking, TrackOrder
 from rig.background.errands import Errands
+from rig.background.messages import Progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,5 +114,5 @@ class Follower:
         return Tracking(state="done", share=1.0, tracked=pulses, stopped=found.stopped)
 
 
-def _heard(state: Tracking, news: dict[str, Any]) -> Tracking:
-    return state.model_copy(update=news)
+def _heard(state: Tracking, news: Progress | bool) -> Tracking:
+    return state.model_copy(update={"paused": news} if isinstance(news, bool) else {"share": news.share})

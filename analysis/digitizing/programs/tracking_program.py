@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.background.errands import run_errand
+from rig.background.messages import Progress
 from rig.background.program import Teller
 
 if TYPE_CHECKING:
@@ -20,11 +21,16 @@ def _track(order: "TrackingOrder", _: Path, tell: Teller) -> "Followed":
     steps, done = steps_of(order.order), count()
 
     def step() -> None:
-        tell(share=min(1.0, next(done) / steps))
+        tell(Progress(share=min(1.0, next(done) / steps)))
 
     pursuit = Pursuit(OpenedLog(order.log), order.system, order.marks, order.measured, order.order, step)
     return Followed(order.order, follow(pursuit))
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Do one errand."""
     run_errand(_track)
+
+
+if __name__ == "__main__":
+    main()

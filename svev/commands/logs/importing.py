@@ -15,7 +15,7 @@ from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.settings.file import load_rig
 from rig.settings.trigger import TriggerSettings
-from service.recordings.calibration import read_calibration
+from service.rig_file import read_calibration
 from svev import console
 from svev.commands.logs.contents import AlsoJson, check_pulses
 from svev.overwriting import ForceOption

@@ -5,9 +5,9 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any
 
 from rig.background.child import run_child
+from tests.rig.background.computing_program import Begun, Compute, Computed
 from tests.support.waiting import wait_until
 
 _PROGRAM = "tests.rig.background.computing_program"
@@ -32,13 +32,13 @@ class _Errand:
         self.wanted = False
         self._thread.join()
 
-    def _tell(self, news: dict[str, Any]) -> None:
-        self.pid = news["pid"]
+    def _tell(self, news: Begun) -> None:
+        self.pid = news.pid
 
     def _run(self) -> None:
         end = run_child(
-            _PROGRAM, {"long": True}, busy=lambda: self.busy, wanted=lambda: self.wanted, tell=self._tell,
-            hold=self.held.append, yielding=False,
+            _PROGRAM, Compute(long=True), Begun | Computed, busy=lambda: self.busy, wanted=lambda: self.wanted,
+            tell=self._tell, hold=self.held.append, yielding=False,
         )  # fmt: skip
         assert end is None
 
@@ -61,20 +61,21 @@ def test_it_stands_still_in_the_middle_of_its_work_and_goes_on() -> None:
 
 def test_what_is_asked_for_during_a_recording_is_done_after_it() -> None:
     held: list[bool] = []
-    said: list[dict[str, Any]] = []
+    said: list[Begun] = []
     begun = time.monotonic()
 
     def busy() -> bool:
         return time.monotonic() < begun + 1.0  # in which it would have started and done it
 
-    def tell(news: dict[str, Any]) -> None:
+    def tell(news: Begun) -> None:
         assert not busy()
         said.append(news)
 
     end = run_child(
-        _PROGRAM, {"long": False}, busy=busy, wanted=lambda: True, tell=tell, hold=held.append, yielding=False
-    )
-    assert (end, held, len(said)) == ({"done": True}, [True, False], 1)
+        _PROGRAM, Compute(long=False), Begun | Computed, busy=busy, wanted=lambda: True, tell=tell, hold=held.append,
+        yielding=False,
+    )  # fmt: skip
+    assert (end, held, len(said)) == (Computed(), [True, False], 1)
 
 
 def test_one_that_stands_still_is_killed_with_the_service() -> None:

@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from rig.api.export import ExportOrder
 from rig.background.child import run_child
+from rig.background.messages import Failed
 from rig.transport.launcher import program_command, program_environment
+from service.exports.program import Export, Exported
 
 _CODE = Path(__file__).parents[3]
 _ROOMS = (
@@ -73,10 +76,7 @@ def test_no_module_starts_an_interpreter_by_itself() -> None:
 
 def test_an_export_is_made_in_such_a_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    order = {"log": str(folder / "none.mcap"), "order": {"kind": "csv"}, "out": str(folder / "out.csv")}
-    end = run_child(
-        "service.exports.program", order, busy=lambda: False, wanted=lambda: True, tell=lambda _: None,
-        hold=lambda _: None,
-    )  # fmt: skip
-    assert end is not None
-    assert "none.mcap" in str(end), "our program has looked for the log"
+    order = Export(log=folder / "none.mcap", order=ExportOrder(kind="csv"), out=folder / "out.csv")
+    end = run_child("service.exports.program", order, Exported, busy=lambda: False, wanted=lambda: True)
+    assert isinstance(end, Failed)
+    assert "none.mcap" in end.said.text, "our program has looked for the log"

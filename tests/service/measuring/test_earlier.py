@@ -10,8 +10,8 @@ from recorder.catalogue.folder import Catalogue
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import write_session_changes
 from rig.api.jump import LastJump
-from service.measuring.earlier import earlier_jumps
 from service.measuring.keeping import keep_result
+from service.measuring.program import _earlier
 from service.recordings.measured_jumps import MeasuredJumps
 from tests.recorder.logs import ALL_OK, write_log
 
@@ -47,7 +47,7 @@ def folder(tmp_path: Path) -> Path:
 
 def _speeds(folder: Path, log: str = "fresh") -> list[float]:
     files = MeasuredJumps(Catalogue(folder)).others_of_athlete(log)
-    return sorted(jump.figures["takeoff_speed"].value for jump in earlier_jumps(map(str, files)))
+    return sorted(jump.figures["takeoff_speed"].value for jump in _earlier(files))
 
 
 def test_only_the_athletes_other_jumps(folder: Path) -> None:

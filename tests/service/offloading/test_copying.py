@@ -1,9 +1,7 @@
 """Copies of logs on another disk: gone on with after a break, read back, and never another log's."""
 
 import hashlib
-import json
 import os
-import signal
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -13,22 +11,22 @@ import numpy as np
 import pytest
 
 from rig.background.child import run_child
+from rig.background.messages import End, Failed, Progress
 from rig.errors import StorageError
-from rig.transport.launcher import program_command, program_environment
+from rig.transport.process_table import Child, ProcessSpec
 from service.offloading import verified_copy
+from service.offloading.copying import Copy
 from service.offloading.verified_copy import copy_file
 from tests.support.waiting import wait_until
 
 DATA = np.random.default_rng(3).bytes(9_000_000)
 
 
-def _copy(*paths: Path, to: Path, busy: Callable[[], bool] = lambda: False) -> dict[str, Any]:
-    end = run_child(
-        "service.offloading.copying", {"paths": [str(path) for path in paths], "to": str(to)},
-        busy=busy, wanted=lambda: True, tell=lambda _: None, hold=lambda _: None, yielding=False,
+def _copy(*paths: Path, to: Path, tell: Callable[[Progress], None] = lambda _: None) -> End | None:
+    return run_child(
+        "service.offloading.copying", Copy(paths=paths, to=to), Progress | End,
+        busy=lambda: False, wanted=lambda: True, tell=tell, yielding=False,
     )  # fmt: skip
-    assert end is not None
-    return end
 
 
 @pytest.fixture
@@ -46,13 +44,13 @@ def test_a_copied_log_has_its_checksum_beside_it(places: tuple[Path, Path]) -> N
     results = log.with_suffix(".measured")
     results.mkdir()
     (results / "report.html").write_text("one")
-    assert _copy(log, results, to=there) == {}
+    assert _copy(log, results, to=there) == End()
     assert sorted(path.name for path in there.iterdir()) == ["jump.mcap", "jump.mcap.sha256", "jump.measured"]
     checked = ["/usr/bin/sha256sum", "--check", "--quiet", "jump.mcap.sha256"]
     subprocess.run(checked, cwd=there, check=True)
     (results / "report.html").write_text("two")
     copied = (there / "jump.mcap").stat()
-    assert _copy(log, results, to=there) == {}
+    assert _copy(log, results, to=there) == End()
     assert (there / "jump.measured" / "report.html").read_text() == "two"
     assert (there / "jump.mcap").stat() == copied
 
@@ -88,11 +86,13 @@ def test_what_is_read_back_otherwise_is_no_copy(places: tuple[Path, Path], monke
 def test_a_copy_of_an_earlier_version_is_confirmed_and_another_log_refused(places: tuple[Path, Path]) -> None:
     log, there = places
     (there / "jump.mcap").write_bytes(DATA)
-    assert _copy(log, to=there) == {}
+    assert _copy(log, to=there) == End()
     assert (there / "jump.mcap.sha256").read_text() == f"{hashlib.sha256(DATA).hexdigest()}  jump.mcap\n"
     (there / "jump.mcap.sha256").unlink()
     (there / "jump.mcap").write_bytes(DATA[:-1] + b"?")
-    assert "is another log of this name" in _copy(log, to=there)["problem"]["text"]
+    end = _copy(log, to=there)
+    assert isinstance(end, Failed)
+    assert "is another log of this name" in end.said.text
     assert not (there / "jump.mcap.sha256").exists()
 
 
@@ -101,16 +101,9 @@ def test_a_killed_copy_leaves_no_log_and_goes_on(places: tuple[Path, Path]) -> N
     large = np.random.default_rng(4).bytes(40_000_000)
     log.write_bytes(large)
     part = there / ".jump.mcap.part"
-    asked = json.dumps({"paths": [str(log)], "to": str(there)}) + "\n"
-    with subprocess.Popen(
-        [*program_command("service.offloading.copying"), "at-once"],
-        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, env=program_environment(),
-    ) as program:  # fmt: skip
-        assert program.stdin is not None
-        program.stdin.write(asked.encode())
-        program.stdin.flush()
-        wait_until(part.exists, "it is begun")
-        program.send_signal(signal.SIGKILL)
+    program = Child(ProcessSpec("copying", "service.offloading.copying", Copy(paths=(log,), to=there)))
+    wait_until(part.exists, "it is begun")
+    program.kill()
     assert not (there / "jump.mcap").exists()
-    assert _copy(log, to=there) == {}
+    assert _copy(log, to=there) == End()
     assert (there / "jump.mcap").read_bytes() == large

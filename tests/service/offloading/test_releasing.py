@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from recorder.catalogue.folder import Catalogue
+from rig.background.messages import End
 from rig.events import Event
 from rig.settings.model import OffloadSettings
-from service.offloading.copying import _copy
+from service.offloading.copying import Copy, _copy
 from service.offloading.notes import CopyNotes, mark_of
 from service.offloading.releasing import Releasing, Removal
 from tests.recorder.logs import write_log
@@ -38,7 +39,7 @@ class Bench:
             then = time.time() - days * DAY_S
             os.utime(log, (then, then))
             mark = mark_of(log)
-            assert _copy({"paths": [str(log)], "to": str(self.to)}, lambda **_: None) == {}  # type: ignore[arg-type]
+            assert _copy(Copy(paths=(log,), to=self.to), lambda *_, **__: None) == End()  # type: ignore[arg-type]
             self.notes.note(log, mark, None)
 
     def log(self, name: str) -> Path:

@@ -25,8 +25,7 @@ from webpanel.door.link_file import NAME, LinkFile
 from webpanel.door.links import SECRET_NAME, Links, kept_secret
 from webpanel.door.roles import Role, needed_role
 from webpanel.door.tokens import Tokens
-from webpanel.qr_code import qr_svg
-from webpanel.routes.links import address_for_phones
+from webpanel.routes.links import address_for_phones, qr_svg
 
 TOKEN = "a-token-for-the-tests-only"  # noqa: S105
 BEARER = {"Authorization": f"Bearer {TOKEN}"}

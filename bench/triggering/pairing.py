@@ -35,6 +35,7 @@ CASES: Final = (
         for words, slips in (("one period back", (-math.inf,)), ("one period on", (math.inf,)), ("by 2 ms", (2.0,)))
         for missed in (False, True)
     ),
+    Case("times of one camera slip by 2 ms", slips_ms=(2.0,), every_s=30.0, missed=0.05, lost=0.05),
     *(Case(f"clocks step by {ms:g} ms", steps_ms=(ms, -ms)) for ms in (0.8, 2.0, 5.0)),
     Case("clocks step back at a missed pulse", steps_ms=(-math.inf,), at_miss=True),
     Case("all clocks step together", steps_ms=(math.inf, -math.inf, 2.0), together=True),

@@ -120,13 +120,18 @@ def stretches(runs: Sequence[Run], shifted: Sequence[int]) -> list[Stretch]:
 
 
 def _shift(usual: Run, run: Run) -> int | None:
-    """By how many periods later than usual the frames of a run came; None: too few to tell, or no rhythm."""
+    """By how many periods later than usual the frames of a run came; None: too few to tell, or no rhythm.
+
+    The soonest tells it, which a slow link does not change, and the mean, which one odd time does not change.
+    """
     if run.farther >= _RHYTHM * run.nearest:
         return None
     mean_excess = max(each.late / each.frames - each.soonest for each in (usual, run))
     if min(usual.frames, run.frames) * run.nearest < _SURE * mean_excess:
         return None
-    return round((run.soonest - usual.soonest) / run.nearest)
+    soonest = round((run.soonest - usual.soonest) / run.nearest)
+    mean = round((run.late / run.frames - usual.late / usual.frames) / run.nearest)
+    return min(soonest, mean, key=abs)
 
 
 def _between(found: Sequence[int | None], place: int) -> int:

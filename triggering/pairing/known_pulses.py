@@ -31,6 +31,7 @@ class KnownPulses:
         self.closed = self.proven_by_ids = self.unwatched = 0
         self._open: list[OpenPulse] = []
         self._decided: deque[HostNs] = deque(maxlen=_REMEMBERED)
+        self._delivered: deque[int] = deque(maxlen=_REMEMBERED)
 
     @property
     def open(self) -> Sequence[OpenPulse]:
@@ -65,6 +66,7 @@ class KnownPulses:
         """Take the first open pulse out, which is decided now."""
         pulse = self._open.pop(0)
         self._decided.append(pulse.time)
+        self._delivered.append(pulse.delivered)
         self.closed += 1
         self.proven_by_ids += pulse.proven_by_ids
         self.unwatched += pulse.unwatched
@@ -85,6 +87,16 @@ class KnownPulses:
             if pulse.time > time + half_ns:
                 return
             yield pulse
+
+    def nearest_decided(self, time: HostNs, cameras: int) -> HostNs | None:
+        """Time of the decided pulse nearest to a time of which one of some cameras delivered a frame.
+
+        Args:
+            time: the time.
+            cameras: one bit each.
+        """
+        those = (of for of, delivered in zip(self._decided, self._delivered, strict=True) if delivered & cameras)
+        return min(those, key=lambda of: abs(of - time), default=None)
 
     def count(self, since: HostNs, until: HostNs, tolerance: float, frames: Iterable[HostNs]) -> int | None:
         """How many pulses there are after one time, until another; None: that is too long ago.

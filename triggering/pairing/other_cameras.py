@@ -28,9 +28,12 @@ class OtherCameras:
     def coincide(self, time: HostNs) -> bool | None:
         """Whether one of them has a frame of a time, and this camera has none yet; None: none has any near it."""
         train, near = self._train, None
-        if train.is_decided(time):
-            return None
         half, others = train.period_ns / 2, ~(1 << self._camera)
+        decided = self._pulses.nearest_decided(time, others)
+        if decided is not None and train.tolerance_ns < abs(decided - time) <= half:
+            near = False
+        if train.is_decided(time):
+            return near
         for pulse in self._pulses.near(time, half):
             if pulse.delivered & others:
                 if abs(pulse.time - time) <= train.tolerance_ns and pulse.frames[self._camera] is None:

@@ -89,12 +89,14 @@ def test_no_triplet_mixes_pulses_and_every_possible_one_is_found(case: Case, fau
     found = recount(tags_of(hill.closed))
     if case.slips_ms:  # nobody can find them again: the camera is not used any more, and that is said
         assert "contradict each other" in hill.said or "and no camera has both" in hill.said
+        assert not result.invented or case.every_s * max(case.rates_hz) * 2 < PULSES, "one camera slips: no second tag"
     else:
         # The time of a single frame may be taken for that of a pulse beside the rhythm.
         assert result.invented <= troubles * bool(case.spikes_ms or case.together)
         assert result.not_found <= troubles * (COST_LATE if case.stalls_ms or case.at_miss or case.delays_ms else COST)
         assert case.reboots or found.unproven <= len(NAMES) * COST * (troubles + 1)
     asleep = len(NAMES) * troubles if case.suspended or case.skipped_ids or case.together else 0
+    assert asleep or not found.misfiled, "right frames are accused"
     small = bool(case.steps_ms) and max(map(abs, case.steps_ms)) < LEAST_SEEN_MS
     several = case.spikes_ms or case.stalls_ms or case.skipped_ids or case.together or case.at_miss
     assert found.disagreements <= hill.contradicted + asleep + troubles * bool(small or several), found.differences

@@ -140,9 +140,9 @@ class Plausibility:
 
     def _judge_in_doubt(self, evidence: _Evidence) -> Verdict:
         """Judge a frame of a doubted camera: several in a row have to agree in everything."""
-        first, several = evidence.waiting[0], len(evidence.group) >= _SEVERAL
+        several = len(evidence.group) >= _SEVERAL
         sound = several and evidence.read and self._is_sound(evidence)
-        if sound and evidence.others.coincide(first.time) is not False:
+        if sound and all(evidence.others.coincide(frame.time) is not False for frame in evidence.group):
             return Verdict.ACCEPTED
         return Verdict.REJECTED if evidence.closed or several else Verdict.WAITS
 

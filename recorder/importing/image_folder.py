@@ -30,8 +30,8 @@ _DIGITS: Final = re.compile(r"(\d+)")
 class ImageFolder:
     """The images of a folder, in the order of the numbers in their names; those in folders inside it do not count.
 
-    Where the names differ in one number only, that is the number of the frame, and a number that is left out is a frame
-    that was lost. Otherwise frames count from 1.
+    Where one number of the names counts, it is that of the frame, and a number that is left out is a frame that was
+    lost. Otherwise frames count from 1.
 
     Args:
         path: the folder.
@@ -134,19 +134,39 @@ def _frame_numbers(path: Path, names: Sequence[str]) -> tuple[list[int], int]:
     columns = list(zip(*(map(int, part[1::2]) for part in parts), strict=True))
     varying = [column for column in columns if len(set(column)) > 1]
     if len(varying) > 1:
-        return in_order, 1
+        return _counter(varying) or (in_order, 1)
     numbers = list(varying[0]) if varying else [columns[0][0]] * len(names) if columns else []
     for one, two, earlier, later in zip(numbers, numbers[1:], names, names[1:], strict=False):
         if one == two:
             raise BadInputError(f"{path}: {earlier} and {later} have the same number: leave one of them there")
     if not numbers:
         return in_order, 1
+    # Names that count something else, e.g. milliseconds, tell nothing of frames that are left out.
+    return (numbers, step) if (step := _step(numbers)) else (in_order, 1)
+
+
+def _counter(columns: Sequence[Sequence[int]]) -> tuple[list[int], int] | None:
+    """The numbers that count the frames beside others that change too, such as the time; None: none does, or several.
+
+    Returns:
+        The numbers and the usual step between them.
+    """
+    found = {}
+    for numbers in columns:
+        if step := _step(numbers):
+            found[tuple((each - numbers[0]) // step for each in numbers)] = list(numbers), step
+    return next(iter(found.values())) if len(found) == 1 else None
+
+
+def _step(numbers: Sequence[int]) -> int:
+    """The usual step between numbers that count frames, some of which may be left out; 0: they do not."""
     steps = Counter(later - earlier for earlier, later in pairwise(numbers))
     step = min(steps)
+    if step <= 0:
+        return 0
     regular = 2 * steps[step] >= len(numbers) - 1 and all(each % step == 0 for each in steps)
     few = (numbers[-1] - numbers[0]) // step < 2 * len(numbers)
-    # Names that count something else, e.g. milliseconds, tell nothing of frames that are left out.
-    return (numbers, step) if regular and few else (in_order, 1)
+    return step if regular and few else 0
 
 
 def _read(path: Path) -> Stored | str:

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from analysis.digitizing.marks.journal import Entered, Key
 from analysis.digitizing.marks.things import is_line
 from photogrammetry.exchange.dialect import Row, read_rows, with_points
+from photogrammetry.exchange.part import is_written_number
 from rig.api.digitizing import Mark, MarkState
 from rig.errors import BadInputError
 
@@ -124,15 +125,13 @@ def _pair(
         return None
     if len(given) < len(names):
         raise BadInputError(f"{row.place}: give both, {' and '.join(names)}, or none of them")
-    try:
-        first, second = (float(numbers.get(word, word)) for word in given)
-    except ValueError:
-        raise BadInputError(f"{row.place}: {' and '.join(names)} are {' and '.join(given)}; write numbers") from None
-    return first, second
+    words = [numbers.get(word, word) for word in given]
+    if not all(map(is_written_number, words)):
+        raise BadInputError(f"{row.place}: {' and '.join(names)} are {' and '.join(given)}; write numbers")
+    return float(words[0]), float(words[1])
 
 
 def _whole(row: Row, word: str) -> int:
-    try:
-        return int(word)
-    except ValueError:
-        raise BadInputError(f'{row.place}: "{word}" is no whole number; correct pulse and vertex') from None
+    if not (word.isascii() and word.isdecimal()):
+        raise BadInputError(f'{row.place}: "{word}" is no whole number; correct pulse and vertex')
+    return int(word)

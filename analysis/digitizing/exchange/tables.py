@@ -52,6 +52,8 @@ def read_matrix(path: Path) -> tuple[list[str], Floats]:
 
 def _number(word: str) -> float:
     word = word.strip()
+    if "_" in word:  # Python's own way to write 1000 as 1_000
+        raise ValueError(f"{word!r} is no number")
     return float(word) if word else np.nan
 
 

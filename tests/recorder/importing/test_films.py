@@ -50,6 +50,24 @@ def test_names_that_count_something_else_count_nothing(numbers: list[int], tmp_p
     assert film.first == 1
 
 
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["120001_0998", "120001_0999", "120002_1001", "120002_1002"], [998, 999, 1001, 1002]),
+        (["120001_5", "120002_6", "120004_8"], [5, 6, 8]),
+        (["120001_1", "120001_2", "120002_1", "120002_2"], [1, 2, 3, 4]),
+        (["10_1", "11_2", "13_3", "14_5"], [1, 2, 3, 4]),
+    ],
+)
+def test_the_counter_is_found_beside_the_time(names: list[str], expected: list[int], tmp_path: Path) -> None:
+    (tmp_path / "K1").mkdir()
+    for name in names:
+        cv2.imwrite(str(tmp_path / "K1" / f"{name}.png"), picture(1))
+    film = ImageFolder(tmp_path / "K1")
+    whole = [taken.number for taken in film.frames(film.first) if taken.status is FrameStatus.OK]
+    assert whole == expected
+
+
 def test_an_unreadable_image_between_whole_ones_is_damaged(tmp_path: Path) -> None:
     folder = write_folder(tmp_path / "K1", range(5))
     whole = (folder / "frame_2.png").read_bytes()

@@ -150,9 +150,10 @@ def test_files_of_dltdv_are_read(tmp_path: Path) -> None:
         read_dltdv(sparse, cameras, PULSES, things=["P1"])
     with pytest.raises(BadInputError, match="is no file of DLTdv"):
         read_dltdv(tmp_path / "marks.csv", cameras, PULSES)
-    path.write_text("pt1_cam1_X;pt1_cam1_Y\n1,5;2,5\n")
-    with pytest.raises(BadInputError, match="is no table of numbers"):
-        read_dltdv(path, ["K1"], PULSES, things=["P1"])
+    for text in ("pt1_cam1_X;pt1_cam1_Y\n1,5;2,5\n", "pt1_cam1_X,pt1_cam1_Y\n1_0,2\n"):
+        path.write_text(text)
+        with pytest.raises(BadInputError, match="is no table of numbers"):
+            read_dltdv(path, ["K1"], PULSES, things=["P1"])
 
 
 def test_columns_in_another_order_are_refused(tmp_path: Path) -> None:

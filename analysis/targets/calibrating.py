@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from analysis.targets.mixing import adjusted_or_none, of_one_lens
 from analysis.targets.network_of import MeasuredDistance, Picture, network_of
 from analysis.targets.pattern import Layout, target_of
 from analysis.targets.verdict import CameraVerdict, print_notes, require_poses, verdicts
@@ -57,11 +58,12 @@ def calibrate_pictures(
         NotSolvableError, NotConvergedError, RefusedError: as the adjustment.
     """
     network, notes = network_of(pictures, layout, distances, flat=flat)
-    used = {image.name for image in network.images}
-    pictures = tuple(picture for picture in pictures if picture.name in used)
     start = state_of(network)
-    require_poses(pictures, start.rotation, start.position - start.xyz.mean(axis=0))
-    network, moved = _without_moved(_with_better_start(network))
+    require_poses(_used(pictures, network), start.rotation, start.position - start.xyz.mean(axis=0))
+    network, odd = _with_better_start(network)
+    network, contradicting = of_one_lens(network)
+    pictures = _used(pictures, network)
+    network, moved = _without_moved(network)
     chosen, left_out = with_significant(network)
     calibration = calibrate(chosen)
     a = calibration.outcome.adjustment
@@ -70,27 +72,40 @@ def calibrate_pictures(
         calibration,
         pictures,
         tuple(verdicts(a, pictures)),
-        (*notes, *moved, *left_out, *print_notes(a, layout, scaled=bool(distances))),
+        (*notes, *odd, *contradicting, *moved, *left_out, *print_notes(a, layout, scaled=bool(distances))),
     )
 
 
-def _with_better_start(network: Network) -> Network:
-    """The network adjusted by c alone of the interior orientations: from there the others converge, too."""
+def _used(pictures: Sequence[Picture], network: Network) -> tuple[Picture, ...]:
+    names = {image.name for image in network.images}
+    return tuple(picture for picture in pictures if picture.name in names)
+
+
+def _with_better_start(network: Network) -> tuple[Network, list[str]]:
+    """The network adjusted by c alone of the interior orientations: from there the others converge, too.
+
+    Returns:
+        The network, and a line for each picture that contradicts all others so much that nothing converges with it.
+    """
     simple = replace(
         network,
         cameras=tuple(replace(one, estimate=("c",), sigma={"c": one.sigma["c"]}) for one in network.cameras),
     )
-    try:
-        better = _at(simple, adjust_once(simple, state_of(simple)))
-    except NotConvergedError:
+    a = adjusted_or_none(simple)
+    if a is None:
+        smaller, odd = of_one_lens(network)
+        if odd:
+            network, more = _with_better_start(smaller)
+            return network, [*odd, *more]
         raise NotConvergedError(
             "the pictures contradict each other: targets were moved on the frame between pictures, or a folder holds "
-            "pictures of two cameras or zooms; take them again with all targets fixed"
-        ) from None
+            "pictures of several cameras or zooms; take them again with all targets fixed"
+        )
+    better = _at(simple, a)
     cameras = (
         replace(one, interior=found.interior) for one, found in zip(network.cameras, better.cameras, strict=True)
     )
-    return replace(better, cameras=tuple(cameras))
+    return replace(better, cameras=tuple(cameras)), []
 
 
 def _without_moved(network: Network) -> tuple[Network, list[str]]:

@@ -90,6 +90,7 @@ def _markers(image: NDArray[np.uint8], layout: Layout) -> list[tuple[int, Floats
     parameters.adaptiveThreshWinSizeMin, parameters.adaptiveThreshWinSizeStep = 5, 12
     parameters.adaptiveThreshWinSizeMax = max(29, min(image.shape) // 10)
     parameters.minMarkerPerimeterRate = 0.02
+    parameters.perspectiveRemovePixelPerCell = 8  # fields three pixels wide, seen aslant, are misread with OpenCV's 4
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(DICTIONARY), parameters)
     quads, codes, _ = detector.detectMarkers(image)
     if codes is None:

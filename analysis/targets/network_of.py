@@ -28,13 +28,15 @@ from photogrammetry.network.selection import RAYS
 from rig.arrays import Floats
 from rig.errors import BadInputError
 
-#: Unknowns of each camera at first; `with_significant` takes out the distortions that the pictures do not ask for.
+#: Unknowns of each camera at first; `with_significant` takes out `a2` where the pictures do not ask for it.
 ESTIMATE = ("c", "x0", "y0", "a1", "a2", "b1", "b2")
 #: What is known of any lens beforehand: sigmas of weighted observations, in terms of the picture's width w. They
 #: keep pictures that say too little solvable, so that the verdict can tell what is missing; others they do not touch.
 _C, _PRINCIPAL, _RADIAL, _DECENTRING = 0.5, 0.05, 0.1, 0.005  # c: of itself; x0, y0: of w; shifts at w / 2: of w / 2
 #: Corners that a picture needs to be worth its six unknowns.
 FEWEST_CORNERS = 8
+#: A picture is joined to the others by so many corners at least, each of which so many pictures show.
+_SHARED, _SHARING = 4, 3
 _FLAT_MM = 0.05  # sigma of a corner off the plane of a board that is said to be flat
 _OTHER_UNIT = 3.0  # times the nominal distance: prints are not that far off, other units are
 _PRINTED = 0.005  # sigma of its length, as part of the nominal one
@@ -83,7 +85,8 @@ def network_of(
         for k, picture in enumerate(pictures)
         if k not in start.poses
     ]
-    used = [(k, picture) for k, picture in enumerate(pictures) if k in start.poses]
+    used, loose = _joined([(k, picture) for k, picture in enumerate(pictures) if k in start.poses])
+    notes += loose
     rays = Counter(name for _, picture in used for name in picture.sight.corners if name in start.places)
     names = sorted(name for name, count in rays.items() if count >= RAYS)
     number = {name: i for i, name in enumerate(names)}
@@ -119,6 +122,26 @@ def network_of(
         ),
         notes,
     )
+
+
+def _joined(used: list[tuple[int, Picture]]) -> tuple[list[tuple[int, Picture]], list[str]]:
+    """The pictures without those that share their targets with one other picture alone, and a line for each of those.
+
+    Two pictures tell directions of what only they show, and no size: how far away it is stays undetermined.
+    """
+    notes: list[str] = []
+    while len(used) > _SHARING:
+        rays = Counter(name for _, picture in used for name in picture.sight.corners)
+        shared = [sum(rays[name] >= _SHARING for name in picture.sight.corners) for _, picture in used]
+        worst = min(range(len(used)), key=lambda i: shared[i])
+        if shared[worst] >= _SHARED:
+            break
+        notes.append(
+            f"{used[worst][1].name} is left out: no two other pictures show its targets; show the same targets in more "
+            "pictures"
+        )
+        used = [*used[:worst], *used[worst + 1 :]]
+    return used, notes
 
 
 def _camera(name: str, c: float, size: tuple[int, int]) -> Camera:

@@ -64,7 +64,8 @@ def read_pictures(
     if not used:
         mirrored = sum(picture.sight.mirrored for picture in seen)
         raise BadInputError(
-            f"{mirrored} of {len(seen)} pictures show the targets in a mirror: turn off the camera's mirror or flip"
+            f"{mirrored} of {len(seen)} pictures show the targets in a mirror: turn off the camera's mirror or "
+            "flip, or print the targets anew if they are printed mirrored"
             if mirrored
             else f"no targets in {len(seen)} pictures: take pictures of what svev target prints, larger and in focus"
         )
@@ -159,10 +160,15 @@ def _require_one_size(pictures: Sequence[Picture]) -> None:
     for picture in pictures:
         other = first.setdefault(picture.camera, picture)
         if other.sight.size != picture.sight.size:
+            turned = other.sight.size == picture.sight.size[::-1]
+            remedy = (
+                "a program has turned one of them; take the files as the camera wrote them"
+                if turned
+                else "a calibration belongs to one size; sort the pictures into one folder for each camera and size"
+            )
             raise BadInputError(
                 f"camera {picture.camera}: {other.name} has {other.sight.size[0]} x {other.sight.size[1]} px, "
-                f"{picture.name} {picture.sight.size[0]} x {picture.sight.size[1]} px: a calibration belongs to one "
-                "size; sort the pictures into one folder for each camera and size"
+                f"{picture.name} {picture.sight.size[0]} x {picture.sight.size[1]} px: {remedy}"
             )
 
 

@@ -1,6 +1,6 @@
 """Sheets of targets to print: a ChArUco board, and single targets to cut out, each page with a line to measure."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
 from analysis.targets.pattern import (
@@ -25,6 +25,10 @@ _A4: Final = (210.0, 297.0)
 _MARGIN: Final = 8.0  # that printers leave, mm
 _FOOT: Final = 14.0  # for the check line, mm
 _CHECK: Final = 150.0  # length of the check line, mm
+#: Targets along a side of the frame that is drawn, how far apart they are, and between depths, in their sides.
+FRAME_SIDE: Final = 4
+_FRAME_STEP: Final = 2.6
+_FRAME_DEPTH: Final = 0.3
 _FOOT_WORDS: Final = (
     "mm between the marks: measure it. If it is longer or shorter, print at 100 %, not to fit the page."
 )
@@ -42,15 +46,43 @@ def board_page(layout: Layout) -> Page:
 
 
 def board_geometry(layout: Layout) -> dict[str, Any]:
-    """What is black on the board, for programs that draw it: `svev-board/1`; lengths in mm."""
-    board = {
-        "width_mm": layout.columns * layout.board_mm,
-        "height_mm": layout.rows * layout.board_mm,
-        "cell_mm": layout.board_mm * MARKER / FIELDS / 2.0,
-        "margin_mm": layout.board_mm / 2.0,
-        "black": [[round(part, 6) for part in box] for box in _board(layout)],
+    """What is black on the board, for programs that draw it: `svev-board/2`, one sheet; lengths in mm."""
+    size = layout.columns * layout.board_mm, layout.rows * layout.board_mm
+    sheet = _sheet(size, layout.board_mm, layout.board_mm / 2.0, _board(layout))
+    return {"format": "svev-board/2", "sheets": [sheet]}
+
+
+def frame_geometry(layout: Layout) -> dict[str, Any]:
+    """Single targets on a frame with some depth, for programs that draw it: `svev-board/2`, a sheet for each target.
+
+    They are in a square, at four depths, each turned a little; no one hides another from views of 35 degrees.
+    """
+    side, depth = layout.single_mm, layout.single_mm * BAR
+    span, sheets = side + 2.0 * depth, []
+    for n in range(FRAME_SIDE**2):
+        row, column = divmod(n, FRAME_SIDE)
+        across, down = ((place - (FRAME_SIDE - 1) / 2.0) * _FRAME_STEP * side for place in (column, row))
+        boxes = _single_boxes(FIRST_SINGLE + n, span / 2.0, span / 2.0, side)
+        sheets.append(
+            _sheet((span, span), side, side * (CUT - 0.5 - BAR), boxes)
+            | {
+                "middle_mm": [round(across, 6), round(-down, 6), round(-_FRAME_DEPTH * side * (n * 7 % 4), 6)],
+                "turn_deg": 10.0 * (n % 3 - 1),
+                "tilt_deg": 6.0 * (n % 5 - 2),
+                "roll_deg": 9.0 * (n * 7 % 5 - 2),
+            }
+        )
+    return {"format": "svev-board/2", "sheets": sheets}
+
+
+def _sheet(size: tuple[float, float], side: float, margin: float, black: Iterable[_Box]) -> dict[str, Any]:
+    return {
+        "width_mm": round(size[0], 6),
+        "height_mm": round(size[1], 6),
+        "cell_mm": round(side * MARKER / FIELDS / 2.0, 6),
+        "margin_mm": round(margin, 6),
+        "black": [[round(part, 6) for part in box] for box in black],
     }
-    return {"format": "svev-board/1", "columns": layout.columns, "rows": layout.rows, "board": board}
 
 
 def _board(layout: Layout) -> Iterator[_Box]:
@@ -113,21 +145,27 @@ def _marker(code: int, x: float, y: float, side: float) -> Iterator[_Box]:
 
 
 def _single(page: Page, code: int, x: float, y: float, side: float) -> None:
-    half, depth, cut = side / 2.0, side * BAR, side * CUT
+    cut = side * CUT
     if code >= FIRST_CIRCLES:
         for across, down in CORNERS:
             page.disc(x + across * side, y + down * side, DISC * side)
-    else:
-        page.box(x - half, y - half - depth, side, depth)
-        page.box(x - half, y + half, side, depth)
-        page.box(x - half - depth, y - half, depth, side)
-        page.box(x + half, y - half, depth, side)
-    for box in _marker(code, x, y, side):
+    for box in _single_boxes(code, x, y, side):
         page.box(*box)
     page.text(x - cut + 0.02 * side, y + cut - 0.03 * side, f"{code}", 0.05 * side)
     for along in (-cut, cut):
         page.line(x - cut, y + along, x + cut, y + along, 0.1)
         page.line(x + along, y - cut, x + along, y + cut, 0.1)
+
+
+def _single_boxes(code: int, x: float, y: float, side: float) -> Iterator[_Box]:
+    """The black boxes of a single target about a place."""
+    half, depth = side / 2.0, side * BAR
+    if code < FIRST_CIRCLES:
+        yield x - half, y - half - depth, side, depth
+        yield x - half, y + half, side, depth
+        yield x - half - depth, y - half, depth, side
+        yield x + half, y - half, depth, side
+    yield from _marker(code, x, y, side)
 
 
 def _foot(page: Page, words: str) -> None:

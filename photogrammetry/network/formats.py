@@ -15,7 +15,7 @@ _KINDS: Final = {
     "svev-truth/1": "the truth of a simulated recording",
     "svev-jumper/1": "a measured recording",
     "svev-measurements/1": "measurements of a jumper",
-    "svev-board/1": "a board of svev target",
+    "svev-board/2": "a board or frame of svev target",
 }
 _REMEDIES: Final = {
     (RESULT, NETWORK): "of a calibration and the balls a survey is made by: svev network import {path} balls.csv -o "

@@ -1,4 +1,4 @@
-"""Renders a board with a printed pattern before a plain wall, by ray, as one camera sees it."""
+"""Renders printed sheets, a board or a frame of targets, before a plain wall, by ray, as one camera sees them."""
 
 from typing import Final
 
@@ -10,7 +10,7 @@ from rig.images.pixels import Stored
 from rig.pulse import HillPulse
 from simrig.images.scene.drawing import Image
 from simrig.images.sensor import Sensor
-from simrig.world.board import BoardPose, HeldBoard, load_pattern, placed
+from simrig.world.board import MM_PER_M, BoardPose, HeldBoard, Placed, Sheet, load_sheets, placed
 from simrig.world.projection import Projection
 from simrig.world.scenario import Scenario
 
@@ -19,7 +19,8 @@ _BLACK: Final = 25.0
 _WHITE: Final = 205.0
 _WALL: Final = 110.0
 _FINE: Final = 4  # rays along a pixel's side, while the board is still
-_MM_PER_M: Final = 1000.0
+_OUTLINE: Final = np.array([(-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0)], dtype=float)
+_SPARE_PX: Final = 8  # around the corners of a sheet: its sides are bent by the lens
 _STEPS: Final = 20  # of finding the ideal place that a lens shows at a given one
 
 
@@ -30,7 +31,7 @@ class BoardView:
 
     Args:
         scenario: what there is to see.
-        board: that it shows.
+        board: that it shows, or a frame of targets.
         camera: index of the camera in it.
         width: width of the image, px.
         height: height of the image, px.
@@ -38,7 +39,7 @@ class BoardView:
         bits: of a pixel.
 
     Raises:
-        BadInputError: the pattern cannot be read.
+        BadInputError: the sheets cannot be read.
     """
 
     def __init__(
@@ -48,9 +49,7 @@ class BoardView:
         before = scenario.cameras[scenario.camera_index(board.before)]
         self._before = before.projection(width, height)
         self._projection = self._settings.projection(width, height)
-        self._pattern = load_pattern(board.pattern)
-        white = self._pattern.raster()
-        self._raster = np.asarray(np.pad(_BLACK + white * (_WHITE - _BLACK), 1, constant_values=_WALL), np.float32)
+        self._sheets = [(sheet, _raster(sheet)) for sheet in load_sheets(board.pattern)]
         self._coarse, self._fine = _ideal(self._projection, 1), _ideal(self._projection, _FINE)
         self._blur = scenario.image.blur_sigma_px * _FINE
         self._gain, self._black_level = np.float32(self._settings.gain), np.float32(scenario.image.black_level)
@@ -71,21 +70,59 @@ class BoardView:
 
     def _seen(self, pose: BoardPose, ideal: tuple[Image, Image]) -> Image:
         """What rays meet, each given by its ideal metric coordinates."""
-        there, camera, cell = placed(pose, self._before), self._projection, self._pattern.cell_mm / _MM_PER_M
-        k = camera.R.T @ np.column_stack((there.axes[:, :2], there.middle - camera.X0))
-        h = np.linalg.inv(k)  # (right, up, 1) on the board, m, up to a factor, from the ray (x, y, -c)
-        x, y = ideal
-        right, up, scale = ((row[0] * x + row[1] * y - np.float32(row[2] * camera.c)) for row in h.astype(np.float32))
-        rows, columns = self._raster.shape
-        # cells count from the raster's upper left corner; OpenCV's places from the middle of the first cell
-        across = right / scale * np.float32(1 / cell) + np.float32(columns / 2 - 0.5)
-        down = up / scale * np.float32(-1 / cell) + np.float32(rows / 2 - 0.5)
-        fine = len(across) // camera.height
-        seen = cv2.remap(
-            self._raster, _averaged(across, fine), _averaged(down, fine), cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_CONSTANT, borderValue=_WALL,
-        )  # fmt: skip
-        return np.asarray(seen, np.float32)
+        frame, camera = placed(pose, self._before), self._projection
+        seen = np.full(ideal[0].shape, _WALL, np.float32)
+        there = [(frame.sheet(sheet), sheet, raster) for sheet, raster in self._sheets]
+        for place, sheet, raster in sorted(there, key=lambda each: -float(camera.distance(each[0].middle))):
+            if (part := _part(place, sheet, camera)) is not None:
+                _draw(place, sheet, raster, camera, ideal, seen, part)
+        return seen
+
+
+def _raster(sheet: Sheet) -> Image:
+    """(rows, columns, 2) radiance of each cell, and 1 where there is paper; one cell more on each side, without."""
+    radiance = _BLACK + sheet.raster() * (_WHITE - _BLACK)
+    return np.pad(np.stack((radiance, np.ones_like(radiance)), axis=-1), ((1, 1), (1, 1), (0, 0))).astype(np.float32)
+
+
+def _part(place: Placed, sheet: Sheet, camera: Projection) -> tuple[slice, slice] | None:
+    """Rows and columns of the picture that may show a sheet; None: it is outside, or seen from behind."""
+    if place.axes[:, 2] @ (camera.X0 - place.middle) <= 0.0:
+        return None
+    half = np.array([sheet.width_mm, sheet.height_mm]) / 2.0 + sheet.margin_mm
+    outline = place.middle + (_OUTLINE * half / MM_PER_M) @ place.axes[:, :2].T
+    if camera.distance(outline).min() <= 0.0:
+        return slice(0, camera.height), slice(0, camera.width)
+    x, y = camera.pixels(outline).T
+    rows, columns = (
+        slice(max(0, int(each.min()) - _SPARE_PX), min(end, int(each.max()) + _SPARE_PX + 1))
+        for each, end in ((y, camera.height), (x, camera.width))
+    )
+    return (rows, columns) if min(rows.stop - rows.start, columns.stop - columns.start) >= 2 else None
+
+
+def _draw(
+    place: Placed, sheet: Sheet, raster: Image, camera: Projection, ideal: tuple[Image, Image], seen: Image,
+    part: tuple[slice, slice],
+) -> None:  # fmt: skip
+    """Draw a sheet over what has been drawn behind it."""
+    fine = len(seen) // camera.height
+    wide = tuple(slice(each.start * fine, each.stop * fine) for each in part)
+    k = camera.R.T @ np.column_stack((place.axes[:, :2], place.middle - camera.X0))
+    h = np.linalg.inv(k)  # (right, up, 1) on the sheet, m, up to a factor, from the ray (x, y, -c)
+    x, y = (each[wide] for each in ideal)
+    right, up, scale = ((row[0] * x + row[1] * y - np.float32(row[2] * camera.c)) for row in h.astype(np.float32))
+    rows, columns = raster.shape[:2]
+    cell = sheet.cell_mm / MM_PER_M
+    # cells count from the raster's upper left corner; OpenCV's places from the middle of the first cell
+    across = right / scale * np.float32(1 / cell) + np.float32(columns / 2 - 0.5)
+    down = up / scale * np.float32(-1 / cell) + np.float32(rows / 2 - 0.5)
+    drawn = cv2.remap(
+        raster, _averaged(across, fine), _averaged(down, fine), cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
+    )
+    behind = seen[wide]
+    behind *= 1.0 - drawn[..., 1]
+    behind += drawn[..., 0]
 
 
 def _averaged(places: Image, fine: int) -> Image:

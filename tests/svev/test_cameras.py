@@ -3,14 +3,18 @@
 import json
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from rig.errors import BadInputError
 from rig.settings.file import CONFIG, load_rig
 from simrig.gige.registers.makers import Maker
 from simrig.programs.simulated_hill import SimulatedHill
+from svev.commands.computer import cameras
+from svev.gige.gvcp import find_cameras
 from tests.capture.aravis.test_makers import make
 from tests.simrig.gige.raw_client import CCP, GvcpClient
 from tests.support.commands import run_svev
@@ -71,6 +75,24 @@ def test_a_camera_in_use_and_addresses_that_do_not_fit_are_refused(addresses: tu
     for wanted, words in refused.items():
         done = _cameras("set-ip", left, wanted, "--interface", "lo")
         assert (done.returncode, words in done.stderr) == (2, True), done.stderr
+
+
+def test_of_cameras_with_one_serial_number_each_is_named_by_its_mac_address(
+    addresses: tuple[str, str, str],
+) -> None:
+    left, right, _ = addresses
+    both = [replace(each, camera=replace(each.camera, serial="0815"))
+            for each in find_cameras("lo") if each.camera.address in {left, right}]  # fmt: skip
+    macs = [each.camera.mac for each in both]
+    with pytest.raises(BadInputError) as refused:
+        cameras._choose("0815", both)
+    said = str(refused.value)
+    assert "0815: 2 cameras have it" in said
+    assert said.endswith("give the MAC address of one")
+    assert all(f"{mac} serial 0815 at " in said for mac in macs)
+    assert [cameras._choose(mac, both).camera.mac for mac in macs] == macs
+    with pytest.raises(BadInputError, match="0816: no camera found by this"):
+        cameras._choose("0816", both)
 
 
 def test_cameras_that_answer_no_broadcast_are_found_by_the_rig_file(tmp_path: Path, loopback: Loopback) -> None:

@@ -1,5 +1,6 @@
 """`svev cameras`: lists GigE Vision cameras, shows their features, gives them addresses."""
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict
 from ipaddress import IPv4Address
@@ -56,6 +57,7 @@ def list_command(
     if as_json:
         console.print_json({"cameras": [_as_json(each) for each in found]})
         return
+    times = Counter(each.camera.address for each in found)
     for each in found:
         camera, port = each.camera, each.interface
         what = (
@@ -64,7 +66,9 @@ def list_command(
         if each.asked:
             what += ", found by the rig file's address: it does not answer broadcasts here"
         elif not each.reachable:
-            what += f", which reaches {port.network} only: svev cameras set-ip"
+            what += f", which reaches {port.network} only: svev cameras set-ip {camera.mac} ADDRESS"
+        elif times[camera.address] > 1:
+            what += f", an address that another camera has too: svev cameras set-ip {camera.mac} ADDRESS"
         console.say(what)
     if not found:
         console.say("no camera answers: check power and cables, and that no firewall blocks UDP port 3956")
@@ -150,11 +154,14 @@ def _choose(which: str, found: list[FoundCamera]) -> FoundCamera:
     """The camera that is meant."""
     wanted = which.lower().replace("-", ":")
     chosen = [each for each in found if which in {each.camera.serial, each.camera.address} or wanted == each.camera.mac]
-    if len(chosen) != 1:
-        there = ", ".join(each.camera.serial for each in found) or "none"
-        many = "no camera" if not chosen else f"{len(chosen)} cameras"
-        raise BadInputError(f"{which}: {many} found by this (there: {there}); give the serial number or MAC address")
-    return chosen[0]
+    if len(chosen) == 1:
+        return chosen[0]
+    there = ", ".join(f"{each.camera.mac} serial {each.camera.serial} at {each.camera.address}" for each in found)
+    if not chosen:
+        raise BadInputError(
+            f"{which}: no camera found by this (there: {there or 'none'}); give MAC address, serial number or address"
+        )
+    raise BadInputError(f"{which}: {len(chosen)} cameras have it (there: {there}); give the MAC address of one")
 
 
 def _check_address(wanted: IPv4Address, chosen: FoundCamera) -> None:

@@ -8,7 +8,7 @@ import typer
 
 from analysis.targets.pattern import FIRST_CIRCLES, FIRST_SINGLE, MOST_SINGLE, Layout
 from analysis.targets.pdf import pdf
-from analysis.targets.sheets import board_geometry, board_page, target_pages
+from analysis.targets.sheets import board_geometry, board_page, frame_geometry, target_pages
 from svev import console
 from svev.commands.networks.delivery import JsonOption
 from svev.commands.networks.layout import BoardOption, SquareOption, TargetOption, columns_and_rows
@@ -23,7 +23,10 @@ def target(
     out: Annotated[
         Path,
         typer.Option(
-            "-o", "--out", metavar="DIR", help="folder for board.pdf, board.json, targets.pdf and circles.pdf"
+            "-o",
+            "--out",
+            metavar="DIR",
+            help="folder for board.pdf, targets.pdf, circles.pdf, board.json and targets.json",
         ),
     ],
     board: BoardOption = "9x6",
@@ -49,12 +52,13 @@ def target(
     files = {"board.pdf": [board_page(layout)]}
     for name, first in (("targets.pdf", FIRST_SINGLE), ("circles.pdf", FIRST_CIRCLES)):
         files[name] = target_pages(layout, range(first, first + targets))
-    geometry = out / "board.json"
-    refuse_existing(*(out / name for name in files), geometry, force=force)
+    drawn = {"board.json": board_geometry(layout), "targets.json": frame_geometry(layout)}
+    refuse_existing(*(out / name for name in (*files, *drawn)), force=force)
     out.mkdir(parents=True, exist_ok=True)
     for name, pages in files.items():
         (out / name).write_bytes(pdf(pages))
-    geometry.write_text(json.dumps(board_geometry(layout)) + "\n", encoding="utf-8")
+    for name, geometry in drawn.items():
+        (out / name).write_text(json.dumps(geometry) + "\n", encoding="utf-8")
     counts = {name: len(pages) for name, pages in files.items()}
     if as_json:
         console.print_json({"folder": str(out), "pages": counts})

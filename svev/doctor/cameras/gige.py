@@ -2,6 +2,7 @@
 
 import os
 import socket
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from rig.errors import BadInputError
@@ -77,16 +78,18 @@ def look_for_cameras(rig: RigSettings) -> Iterator[Finding]:
     if not found:
         remedy = "check power and cables, and that no firewall blocks UDP port 3956"
         yield warning(Topic.CAMERAS, "check_none_found", "no camera answers a broadcast on any network", remedy)
+    times = Counter(each.camera.address for each in found)
     for each in found:
-        yield judge_found(each, names)
+        yield judge_found(each, names, alone=times[each.camera.address] == 1)
 
 
-def judge_found(found: FoundCamera, names: dict[str, str]) -> Finding:
+def judge_found(found: FoundCamera, names: dict[str, str], *, alone: bool = True) -> Finding:
     """Judge a camera that was found.
 
     Args:
         found: the camera.
         names: names of the cameras in the rig file, by address.
+        alone: whether no other camera has its address.
     """
     camera, port = found.camera, found.interface
     said = phrase(
@@ -99,22 +102,26 @@ def judge_found(found: FoundCamera, names: dict[str, str]) -> Finding:
             Topic.CAMERAS,
             "check_found_unreachable",
             "{said}, which is not in the subnet {subnet} of this port",
-            "run: svev cameras set-ip {serial} ADDRESS, or give {port} an address in its subnet",
+            "run: svev cameras set-ip {mac} ADDRESS, or give {port} an address in its subnet",
             said=said,
             subnet=str(port.network),
-            serial=camera.serial,
+            mac=camera.mac,
             port=port.name,
         )
+    if not alone:
+        what = "{said}, an address that another camera has too"
+        remedy = "give each camera an address of its own: svev cameras set-ip {mac} ADDRESS"
+        return warning(Topic.CAMERAS, "check_found_twice", what, remedy, said=said, mac=camera.mac)
     way = way_to(camera.address)
     if way is not None and way.interface != port and way.interface.network.overlaps(port.network):
         return warning(
             Topic.CAMERAS,
             "check_found_elsewhere",
             "{said}, but the computer sends to this address by {way}",
-            "give each port a subnet of its own, then: svev cameras set-ip {serial} ADDRESS",
+            "give each port a subnet of its own, then: svev cameras set-ip {mac} ADDRESS",
             said=said,
             way=way.interface.name,
-            serial=camera.serial,
+            mac=camera.mac,
         )
     if name := names.get(camera.address):
         return passed(Topic.CAMERAS, "check_found", "{said}, {camera} of the rig file", said=said, camera=name)

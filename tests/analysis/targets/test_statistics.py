@@ -1,12 +1,27 @@
 """Whole way from drawn pictures to a lens, many times: errors agree with their sigmas, and targets are found."""
 
+import json
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import TypeAlias
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from analysis.targets.calibrating import calibrate_pictures
 from analysis.targets.detection import find_targets
 from analysis.targets.network_of import Picture
-from analysis.targets.pattern import Layout
+from analysis.targets.pattern import CORNERS, FIRST_SINGLE, Layout
+from analysis.targets.sheets import board_geometry, frame_geometry
+from rig.pulse import HillPulse
+from simrig.images.view import CameraView
+from simrig.world.board import MM_PER_M, BoardPose, HeldBoard, Placed, load_sheets, placed
+from simrig.world.board import Sheet as SimulatedSheet
+from simrig.world.conditions.effects import LensErrors
+from simrig.world.projection import Projection
+from simrig.world.scenario import REFERENCE_WIDTH, ImageEffects, Scenario, SceneCamera
 from tests.analysis.targets.drawn import (
     Array,
     Drawing,
@@ -24,6 +39,8 @@ _DRAWS = 20
 _SIZE = (480, 360)
 _TARGET_MM = 110.0
 _READABLE_PX = 36.0
+#: A picture, and (2,) px where it shows corners, by their names.
+_Taken: TypeAlias = tuple[NDArray[np.uint8], dict[str, Array]]
 
 
 def _camera(random: np.random.Generator) -> DrawnCamera:
@@ -32,7 +49,8 @@ def _camera(random: np.random.Generator) -> DrawnCamera:
     third = random.choice((-1.0, 1.0)) * random.uniform(1.0, 6.0)  # px at the edge
     fifth = random.choice((0.0, 1.0)) * random.uniform(1.0, 2.0)
     x0, y0 = random.uniform(-8.0, 8.0, 2)
-    return DrawnCamera(_SIZE, c, x0, y0, third / edge**3, fifth / edge**5)
+    b1, b2 = random.normal(0.0, 0.05 / 3.0 / edge**2, 2)  # a twentieth of a px at the edge, or nothing that shows
+    return DrawnCamera(_SIZE, c, x0, y0, third / edge**3, fifth / edge**5, b1, b2)
 
 
 def _sheets(kind: str) -> tuple[list[Sheet], Array, float]:
@@ -43,23 +61,92 @@ def _sheets(kind: str) -> tuple[list[Sheet], Array, float]:
     return frame_sheets(target_mm=_TARGET_MM, step=50.0, circles=kind == "circles"), np.array([0.0, 0.0, -75.0]), 1250.0
 
 
-@pytest.mark.long
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize("kind", ["board", "frame", "circles"])
-def test_errors_of_calibrations_agree_with_their_sigmas(kind: str) -> None:
-    random = np.random.default_rng(29)
+def _drawn(kind: str, random: np.random.Generator) -> Iterator[tuple[DrawnCamera, list[_Taken]]]:
+    """Cameras, and pictures by the renderer of these tests."""
     sheets, middle, away = _sheets(kind)
-    places, layout = corner_places(sheets), Layout(single_mm=_TARGET_MM)
-    errors: list[tuple[float, ...]] = []
-    shown = found = 0
-    for _ in range(_DRAWS):
+    places = corner_places(sheets)
+    while True:
         camera = _camera(random)
         drawing = Drawing(camera, noise=2.0, blur=random.uniform(0.5, 1.2), random=random)
+        poses = stations(middle, away * camera.c / _SIZE[0], random, count=9)
+        yield camera, [(drawing.picture(sheets, *pose), seen_at(camera, *pose, places)) for pose in poses]
+
+
+def _simulated(kind: str, random: np.random.Generator, folder: Path) -> Iterator[tuple[DrawnCamera, list[_Taken]]]:
+    """Cameras, and pictures by the renderer of the simulated hill."""
+    layout = Layout(single_mm=_TARGET_MM)
+    geometry = board_geometry(layout) if kind == "board" else frame_geometry(layout)
+    (folder / "sheets.json").write_text(json.dumps(geometry))
+    sheets = load_sheets(folder / "sheets.json")
+    away = (0.27, 1.3)[kind == "frame"]
+    while True:
+        camera = _camera(random)
+        held = HeldBoard(
+            pattern=folder / "sheets.json", before="K1", still_s=1.0, moving_s=1.0,
+            poses=tuple(_poses(random, away * camera.c / _SIZE[0])),
+        )  # fmt: skip
+        wide = REFERENCE_WIDTH / _SIZE[0]  # a scenario's figures belong to pictures of this width
+        powers = {"x0": 1, "y0": 1, "a1": -2, "a2": -4, "b1": -1, "b2": -1}
+        lens = {name: getattr(camera, name) * wide**power for name, power in powers.items()}
+        one = SceneCamera(name="K1", c=camera.c * wide, X0=(0, 0, 0), look_at=(1, 0, 0), lens=LensErrors(**lens))
+        image = ImageEffects(noise_sigma=2.0, blur_sigma_px=random.uniform(0.5, 1.2), snow_flakes=0)
+        scenario = Scenario(
+            name="draw", seed=int(random.integers(1 << 32)), stamp=False, image=image, cameras=(one,), board=held
+        )
+        view, projection, taken = CameraView(scenario, 0, *_SIZE, 1.0), one.projection(*_SIZE), []
+        for n, pose in enumerate(held.poses):
+            out = np.zeros(_SIZE[::-1], np.uint8)
+            view.render_into(out, HillPulse(2 * n))
+            taken.append((out, _shown(layout, sheets, placed(pose, projection), projection)))
+        yield camera, taken
+
+
+def _poses(random: np.random.Generator, away: float) -> Iterator[BoardPose]:
+    """From all sides, half of them rolled by 90 degrees."""
+    for n in range(9):
+        angle, tilt = 2 * np.pi * n / 9, (35.0, 20.0, 10.0)[n % 3]
+        yield BoardPose(
+            away_m=away * random.uniform(0.9, 1.1), right_m=0.06 * away * random.uniform(-1, 1),
+            up_m=0.06 * away * random.uniform(-1, 1), turn_deg=tilt * np.cos(angle), tilt_deg=tilt * np.sin(angle),
+            roll_deg=(0.0, 90.0, 175.0, -90.0)[n % 4] + random.uniform(-5, 5),
+        )  # fmt: skip
+
+
+def _shown(layout: Layout, sheets: Sequence[SimulatedSheet], frame: Placed, camera: Projection) -> dict[str, Array]:
+    """(2,) px where the camera shows corners, of those within its picture."""
+    board = len(sheets) == 1
+    codes = layout.squares if board else range(FIRST_SINGLE, FIRST_SINGLE + len(sheets))
+    shown = {}
+    for code in codes:
+        sheet = sheets[0] if board else sheets[code - FIRST_SINGLE]
+        there = frame.sheet(sheet)
+        for name, corner in zip(layout.corners(code), CORNERS, strict=True):
+            if name is not None:
+                own = layout.board_place(name)
+                half = np.array([sheet.width_mm, -sheet.height_mm]) / 2.0
+                right, up = (corner * (1.0, -1.0) * layout.single_mm if own is None else own[:2] - half) / MM_PER_M
+                place = camera.pixels(there.middle + right * there.axes[:, 0] + up * there.axes[:, 1])
+                if camera.sees(place, margin=-0.5):
+                    shown[name] = place
+    return shown
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    ("kind", "renderer"),
+    [("board", "tests"), ("frame", "tests"), ("circles", "tests"), ("board", "hill"), ("frame", "hill")],
+)
+def test_errors_of_calibrations_agree_with_their_sigmas(kind: str, renderer: str, tmp_path: Path) -> None:
+    random, layout = np.random.default_rng(29), Layout(single_mm=_TARGET_MM)
+    draws = _drawn(kind, random) if renderer == "tests" else _simulated(kind, random, tmp_path)
+    errors: list[tuple[float, ...]] = []
+    shown = found = 0
+    for camera, taken in islice(draws, _DRAWS):
         pictures = []
-        for n, (position, rotation) in enumerate(stations(middle, away * camera.c / _SIZE[0], random, count=9)):
-            sight = find_targets(drawing.picture(sheets, position, rotation), layout, f"{n}")
+        for n, (image, visible) in enumerate(taken):
+            sight = find_targets(image, layout, f"{n}")
             pictures.append(Picture("K1", f"{n}", sight))
-            visible = seen_at(camera, position, rotation, places)
             codes = [code for code in layout.codes if _readable([visible.get(str(n)) for n in layout.corners(code)])]
             shown += len(codes)
             found += sum(code in sight.targets for code in codes)

@@ -2,6 +2,7 @@ import ctypes
 import json
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -98,6 +99,15 @@ def test_the_clock_is_judged_as_the_kernel_judges_it() -> None:
     state = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(512))
     (finding,) = machine.look_at_clock()
     assert finding.level is (Level.WARN if state == clock_error else Level.PASS)
+
+
+def test_a_clock_that_is_years_wrong_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The battery of the mainboard is empty, and there is no network."""
+    monkeypatch.setattr(time, "time", lambda: 946_728_000.0)
+    (finding,) = machine.look_at_clock()
+    assert (finding.level, finding.code) == (Level.WARN, "check_clock_wrong")
+    assert "the clock says 2000-01-01" in finding.what
+    assert "sudo date -s" in finding.remedy
 
 
 def test_the_command_reports_as_json(tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]) -> None:

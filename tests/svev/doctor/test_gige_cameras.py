@@ -139,4 +139,15 @@ def test_a_camera_that_is_found_is_compared_with_the_rig_file(
     camera = GigeCamera("Maker", "Fast", "42", "left", "00:0f:31:01:02:03", address, "255.255.255.0")
     finding = gige.judge_found(FoundCamera(camera, port, reachable), {"192.168.11.2": "K1"})
     assert (finding.level, words in finding.what) == (level, True)
-    assert reachable or "svev cameras set-ip 42" in finding.remedy
+    assert reachable or "svev cameras set-ip 00:0f:31:01:02:03 ADDRESS" in finding.remedy
+
+
+def test_cameras_that_share_an_address_are_named_by_what_only_one_has() -> None:
+    """As they leave the box: one address, and of some makers one serial number."""
+    network = IPv4Network("192.168.11.0/24")
+    port = Interface("eth1", mtu=9000, speed_mbps=1000, network=network, address=network[1])
+    camera = GigeCamera("Maker", "Fast", "42", "left", "00:0f:31:01:02:03", "192.168.11.2", "255.255.255.0")
+    finding = gige.judge_found(FoundCamera(camera, port, reachable=True), {"192.168.11.2": "K1"}, alone=False)
+    assert finding.level is Level.WARN
+    assert "an address that another camera has too" in finding.what
+    assert "svev cameras set-ip 00:0f:31:01:02:03 ADDRESS" in finding.remedy

@@ -13,7 +13,15 @@ from numpy.typing import ArrayLike
 
 from photogrammetry.adjustment.equations.relations import Kind
 from photogrammetry.adjustment.solution.adjustment import Adjustment
-from photogrammetry.geometry.camera_model import Lens, camera_coordinates, distort, ideal_point, linearise, undistort
+from photogrammetry.geometry.camera_model import (
+    INTERIOR,
+    Lens,
+    camera_coordinates,
+    distort,
+    ideal_point,
+    linearise,
+    undistort,
+)
 from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.file import pixel_to_metric
@@ -74,6 +82,12 @@ class PlacedCamera:
     def in_front(self, xyz: ArrayLike) -> Flags:
         """Whether object points (..., 3) lie before the camera."""
         return np.asarray(camera_coordinates(self.rotation, self.position, np.asarray(xyz, float))[..., 2] < 0)
+
+    def shifted(self, px: Floats) -> "PlacedCamera":
+        """The camera of a frame that shows everything so many px (2,) beside where this one shows it."""
+        interior = self.camera.interior.copy()
+        interior[[INTERIOR.index("x0"), INTERIOR.index("y0")]] += px * _MIRROR
+        return replace(self, camera=replace(self.camera, interior=interior))
 
     def linearised(self, xyz: Floats, xy: Floats) -> tuple[Floats, Floats, Floats]:
         """Residuals of image points and their derivatives, px, pixel frame.

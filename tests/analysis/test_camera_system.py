@@ -18,6 +18,11 @@ def test_residual_is_computed_minus_observed() -> None:
     assert np.allclose(_residual(placed, xyz, xy), (-0.5, 0.25), atol=1e-9)
 
 
+def test_a_frame_that_is_off_shows_everything_beside() -> None:
+    placed, xyz, px = true_cameras()["K2"], np.array(((10.0, 0.0, -2.0), (2.0, 1.0, 0.5))), np.array((0.5, -0.25))
+    assert np.allclose(placed.shifted(px).project(xyz), placed.project(xyz) + px, atol=1e-9)
+
+
 def test_derivatives_agree_with_differences() -> None:
     system = true_cameras()
     xyz = np.array((10.0, 0.3, -2.0))

@@ -33,6 +33,7 @@ _FRONT = 4.5  # sigmas: 2 of 300 000 pixels by chance
 _SMALLEST = 12  # px; 15 radii of the smallest marker that can be measured: a jumper is larger
 _SPECK = 8  # pixels of the border of the smallest marker that can be measured
 _REACH = 0.7  # of the length of the largest part of a body that stands out: other parts are not farther from it
+_DARKEST = 0.1  # of the light of the static scene, below which an image shows nothing of it
 _THINNEST = 3  # px; nothing real is thinner at its thickest, but a row of pixels that hold a number is
 _JOIN = 9  # px: what is nearer to each other belongs together
 _MARGIN = 10  # px around what moves
@@ -173,6 +174,25 @@ class Background:
         grey, sigma = self._grey[part], np.sqrt(self._variance * self._ratio[part] + self._shift[part])
         return Region(box[0], box[1], grey.copy(), grey.copy(), sigma, sigma.copy(), np.zeros(grey.shape, bool))
 
+    def relit(self, image: Grey) -> tuple[GreyImage, GreyImage, Floats]:
+        """An image in the light of the static scene, and that scene where the image shows it.
+
+        Args:
+            image: (rows, columns) of this camera.
+
+        Returns:
+            Both, and the shift of the image.
+        """
+        moment = self._moment(image)
+        grey = (image.astype(np.float32) - np.float32(moment.offset)) / np.float32(moment.light)
+        right, down = moment.shift
+        shifted = cv2.addWeighted(self._right, -right, self._down, -down, 0.0)
+        return grey, np.asarray(cv2.add(self._grey, shifted), np.float32), moment.shift
+
+    def shift(self, image: Grey) -> Floats:
+        """How far (2,), px, an image shows things from where the static scene has them."""
+        return self._moment(image).shift
+
     def part(self, image: Grey, low: Integers, high: Integers) -> Region | None:
         """A part of an image, whether anything is in front there or not.
 
@@ -264,7 +284,7 @@ def _solved(rows: GreyImage, values: GreyImage, keep: GreyImage) -> GreyImage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Moment:
-    """An image beside the static scene: gain, offset, shift, px, and variance of reading and per grey value."""
+    """An image beside the static scene: gain, offset, factors of its slopes, variance of reading and per grey value."""
 
     gain: float
     offset: float
@@ -272,6 +292,16 @@ class _Moment:
     down: float
     read: np.float32
     photon: np.float32
+
+    @property
+    def light(self) -> float:
+        """The gain, or what it is at least where something of the scene is seen."""
+        return max(self.gain, _DARKEST)
+
+    @property
+    def shift(self) -> Floats:
+        """How far (2,), px, things are from where the static scene has them."""
+        return -np.array((self.right, self.down)) / self.light
 
 
 def _usual(grey: GreyImage, noise: GreyImage) -> GreyImage:

@@ -84,9 +84,8 @@ def _follow_points(pursuit: Pursuit, starts: dict[str, _Marks], found: Found) ->
     if not starts:
         return known
     log, order = pursuit.log, pursuit.order
-    static = {name: image.grey for name, image in log.static().items()}
     late_s = {camera: log.unmeasured.late_s(camera) for camera in log.unmeasured.cameras}
-    tracker = Tracker(log.frames, log.facts.rate_hz, pursuit.system, static, late_s, pursuit.step)
+    tracker = Tracker(log.frames, log.facts.rate_hz, pursuit.system, log.backgrounds(), late_s, pursuit.step)
     automatic = {thing: pursuit.automatic(thing) for thing in starts}
     end = (log.pulses[-1] if order.direction > 0 else log.pulses[0]) + order.direction
     most = min(order.most, abs(end - order.pulse) - 1)

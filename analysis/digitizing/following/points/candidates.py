@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.digitizing.following.points.appearance import CORRELATED, Match, match, search
-from analysis.digitizing.following.points.motion import Observation
+from analysis.digitizing.following.points.motion import UNSTEADY, Observation
 from analysis.digitizing.following.points.thing_template import Picture, Template, template
 from analysis.measurements.model import PointMeasurement
 from rig.arrays import Floats
@@ -101,21 +101,34 @@ class Candidate:
     step: Floats = field(default_factory=_NO_STEP.copy)
 
 
-def of_automatic(measured: PointMeasurement, predicted: tuple[Floats, Floats]) -> list[Candidate]:
-    """What was measured automatically, if it agrees with the predicted place (2,) and its covariance (2, 2), px."""
-    off = measured.xy - predicted[0]
+def of_automatic(measured: PointMeasurement, predicted: tuple[Floats, Floats], shift: Floats) -> list[Candidate]:
+    """What was measured automatically, if it agrees with what is predicted.
+
+    Args:
+        measured: in an image.
+        predicted: place (2,) and its covariance (2, 2), px, when the camera stands still.
+        shift: (2,) px by which the image is off.
+    """
+    off = measured.xy - shift - predicted[0]
     if off @ np.linalg.solve(predicted[1] + measured.covariance, off) > chdtri(2, LOOK_P):
         return []
     sigma = np.sqrt(np.diagonal(measured.covariance))
-    observation = Observation(measured.xy, measured.covariance, has_offset=False)
+    observation = Observation(measured.xy, measured.covariance + UNSTEADY, shift, has_offset=False)
     return [Candidate(observation, sigma, Origin.AUTOMATIC)]
 
 
 def of_images(
     anchor: Anchor, picture: Picture, predicted: tuple[Floats, Floats], camera: str
 ) -> tuple[list[Candidate], Phrase]:
-    """Places that match a camera's template, or that of its last match; if there are none, why."""
-    xy, covariance = predicted
+    """Places that match a camera's template, or that of its last match; if there are none, why.
+
+    Args:
+        anchor: of the camera.
+        picture: its image.
+        predicted: place (2,) and its covariance (2, 2), px, when the camera stands still.
+        camera: its name.
+    """
+    xy, covariance = predicted[0] + picture.shift, predicted[1]
     if not (np.isfinite(xy).all() and picture.holds(xy, _BORDER_PX)):
         return [], phrase("hand_place_outside", "{camera} does not show its place", camera=camera)
     best = -1.0
@@ -166,6 +179,6 @@ def _worst(found: Match) -> float:
 def _candidate(anchor: Anchor, picture: Picture, found: Match, step: Floats) -> Candidate:
     sigma = np.sqrt(np.diagonal(anchor.covariance + found.drift + found.covariance))
     drifted = step + found.drift
-    observation = Observation(found.xy, found.covariance + drifted)
+    observation = Observation(found.xy, found.covariance + drifted + UNSTEADY, picture.shift)
     after = anchor.matched(picture, found)
     return Candidate(observation, sigma, Origin.TRACKED, found.score, after, drifted)

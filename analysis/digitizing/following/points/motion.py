@@ -6,7 +6,7 @@ begins with the mark's covariance and that of the cameras, which is common to al
 a younger image takes the place of the marked one. So neither the gate nor the sigmas mistake it for fresh noise.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,6 +18,8 @@ from rig.arrays import Floats, Integers
 
 _SPEED, _PLACE = 30.0, 100.0  # standard deviations before anything is known, m/s, m
 ACCELERATION: Final = 20.0  #: standard deviation of an acceleration, m/s^2
+#: By which a frame is off beside its shift: lenses, rolling air, a turn about the axis. Covariance (2, 2), px^2.
+UNSTEADY: Final = 0.07**2 * np.eye(2)
 _ITERATIONS = 3  # of an update: the images are not linear in space
 _TINY = 1e-4  # px, of a mark against its own offset
 
@@ -29,11 +31,13 @@ class Observation:
     Attributes:
         xy: (2,) px.
         covariance: (2, 2) px^2.
+        shift: (2,) px by which the image is off, see `Picture`.
         has_offset: whether it is off by its camera's offset.
     """
 
     xy: Floats
     covariance: Floats
+    shift: Floats
     has_offset: bool = True
 
 
@@ -111,7 +115,7 @@ class Motion:
 
     def updated(self, belief: Belief, seen: Mapping[str, Observation]) -> tuple[Belief, float]:
         """The belief with observations, and their chi-squared against it, redundancy 2 for each (NaN: impossible)."""
-        observed = np.concatenate([each.xy for each in seen.values()])
+        observed = np.concatenate([each.xy - each.shift for each in seen.values()])
         noise = np.zeros((len(observed),) * 2)
         for i, each in enumerate(seen.values()):
             noise[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = each.covariance
@@ -139,7 +143,7 @@ class Motion:
         mean[at], covariance[at], covariance[:, at] = 0.0, 0.0, 0.0
         shared = self.views.shared(names, self.place(belief))
         for i, anchor in enumerate(anchors.values()):
-            shared[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += anchor
+            shared[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += anchor + UNSTEADY
         covariance[np.ix_(at, at)] = shared
         return Belief(mean, covariance)
 
@@ -159,7 +163,7 @@ class Motion:
         at: Integers = np.concatenate([self._offset(name) for name in names])
         allowed = self.views.shared(names, self.place(belief))
         for i, anchor in enumerate(anchors.values()):
-            allowed[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += anchor
+            allowed[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += anchor + UNSTEADY
         offsets = belief.mean[at]
         return float(offsets @ np.linalg.solve(allowed, offsets))
 
@@ -179,6 +183,6 @@ class Motion:
         return xy, rows
 
 
-def mark_observations(names: Sequence[str], xy: Mapping[str, Floats]) -> dict[str, Observation]:
-    """Marks as they are, against offsets that were anchored at them."""
-    return {name: Observation(xy[name], _TINY**2 * np.eye(2)) for name in names}
+def mark_observation(xy: Floats, shift: Floats) -> Observation:
+    """A mark as it is, against an offset that was anchored at it, in an image that is off by so much, px."""
+    return Observation(xy, _TINY**2 * np.eye(2), shift)

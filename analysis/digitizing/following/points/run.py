@@ -7,7 +7,7 @@ from scipy.special import chdtri
 
 from analysis.digitizing.following.points.agreement import GATE_P, agreeing
 from analysis.digitizing.following.points.candidates import Anchor, Candidate, of_automatic, of_images
-from analysis.digitizing.following.points.motion import Belief, KnownMotion, Motion, mark_observations
+from analysis.digitizing.following.points.motion import Belief, KnownMotion, Motion, mark_observation
 from analysis.digitizing.following.points.thing_template import Picture
 from analysis.digitizing.following.points.tracks import FAR, Automatic, Mark, Track, Tracked, one_after_another
 from rig.errors import BadInputError
@@ -89,7 +89,7 @@ class Run:
             marks = self._marks[pulse]
             if pulse != previous:
                 belief = self._motion.predicted(belief, pulse - previous)
-            belief, square = self._with_marks(belief, marks)
+            belief, square = self._with_marks(belief, pulse, marks)
             if not square <= chdtri(2 * len(marks), GATE_P):
                 raise BadInputError(
                     phrase(
@@ -108,9 +108,13 @@ class Run:
     def _least(self) -> int:
         return 2 if self._views.dimensions == 3 else 1
 
-    def _with_marks(self, belief: Belief, marks: Mapping[str, Mark]) -> tuple[Belief, float]:
+    def _with_marks(self, belief: Belief, pulse: int, marks: Mapping[str, Mark]) -> tuple[Belief, float]:
         anchored = self._motion.anchored(belief, {name: np.diag(mark.sigma**2) for name, mark in marks.items()})
-        return self._motion.updated(anchored, mark_observations(tuple(marks), {k: m.xy for k, m in marks.items()}))
+        pictures, still = self._pictures(pulse), np.zeros(2)
+        shifts = {name: pictures[name].shift if name in pictures else still for name in marks}
+        return self._motion.updated(
+            anchored, {name: mark_observation(mark.xy, shifts[name]) for name, mark in marks.items()}
+        )
 
     def _anchor(self, belief: Belief, pulse: int, marks: Mapping[str, Mark]) -> None:
         """Take the templates of cameras from their marks."""
@@ -125,7 +129,7 @@ class Run:
         """The belief after a pulse, None if something contradicts; how many images show the thing; what is missing."""
         marks = self._marks.get(pulse, {})
         if marks:
-            belief, square = self._with_marks(belief, marks)
+            belief, square = self._with_marks(belief, pulse, marks)
             if not square <= chdtri(2 * len(marks), GATE_P):
                 return (
                     None,
@@ -185,7 +189,8 @@ class Run:
                 continue
             candidates: list[Candidate] = []
             if name in measured:
-                candidates = of_automatic(measured[name], self._motion.seen(belief, name, with_offset=False))
+                seen = self._motion.seen(belief, name, with_offset=False)
+                candidates = of_automatic(measured[name], seen, pictures[name].shift)
             anchor = self._anchors.get(name)
             if not candidates and anchor is not None:
                 seen = self._motion.seen(belief, name, with_offset=True)

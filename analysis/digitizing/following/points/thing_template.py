@@ -1,6 +1,6 @@
 """The template of a thing: its grey values in one image, and which share of each pixel belongs to it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -18,14 +18,16 @@ class Picture:
     """An image to look in.
 
     Attributes:
-        grey: (rows, columns) grey values.
+        grey: (rows, columns) grey values, in the light of the background.
         behind: (rows, columns) the static background there; None if it is not known.
         noise: standard deviation of a grey value.
+        shift: (2,) px from where the camera shows things when it stands still to where it shows them now.
     """
 
     grey: GreyImage
     behind: GreyImage | None
     noise: float
+    shift: Floats = field(default_factory=lambda: np.zeros(2))
 
     def holds(self, xy: Floats, margin: float) -> bool:
         """Whether a place lies in the image, so many px from its border."""

@@ -11,19 +11,20 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from analysis.candidates.foreground.background import Background
 from analysis.digitizing.following.points.motion import KnownMotion, Motion
 from analysis.digitizing.following.points.run import Run
 from analysis.digitizing.following.points.thing_template import Picture
 from analysis.digitizing.following.points.tracks import Automatic, Frames, Mark, Track
 from analysis.digitizing.following.points.views import ImageView, SpaceViews, Views
 from analysis.scene.camera_system import CameraSystem
-from analysis.scene.static_image import GreyImage, spatial_noise
+from analysis.scene.static_image import spatial_noise, static_image
 from rig.errors import BadInputError
 from rig.images.picture import Grey
 from rig.phrase import phrase
 
 _BODY_M_S = 5.0  # standard deviation of the velocity of one part of a jumper against another
-_BACKGROUND = 9  # frames of which the median is the static background
+_BACKGROUND = 9  # frames of which the static background is made
 
 
 class Tracker:
@@ -34,7 +35,7 @@ class Tracker:
             that there are not.
         rate_hz: pulses per second.
         system: the oriented cameras; None if there are none.
-        background: the static scene (rows, columns) by camera; made of frames around the track if left out.
+        background: the static scene by camera; made of frames around the track if left out.
         late_s: by camera, how much later than those of the others its exposures are, s.
         step: called at every pulse of every thing.
     """
@@ -44,12 +45,12 @@ class Tracker:
         frames: Frames,
         rate_hz: float,
         system: CameraSystem | None = None,
-        background: Mapping[str, Grey] | None = None,
+        background: Mapping[str, Background] | None = None,
         late_s: Mapping[str, float] | None = None,
         step: Callable[[], None] = lambda: None,
     ) -> None:
         self._frames, self._rate_hz, self._system = frames, rate_hz, system
-        self._background = None if background is None else {k: np.asarray(v, np.float32) for k, v in background.items()}
+        self._background = background
         self._late, self._step = late_s or {}, step
         self._noise: dict[str, float] = {}
 
@@ -152,19 +153,23 @@ class Tracker:
         for name, image in self._frames(pulse).items():
             if name not in self._noise:
                 self._noise[name] = spatial_noise(image)
-            behind = (self._background or {}).get(name)
-            out[name] = Picture(np.asarray(image, np.float32), behind, self._noise[name])
+            background = (self._background or {}).get(name)
+            if background is None:
+                out[name] = Picture(image.astype(np.float32), None, self._noise[name])
+            else:
+                grey, behind, shift = background.relit(image)
+                out[name] = Picture(grey, behind, self._noise[name], shift)
         return out
 
-    def _static(self, pulses: range) -> dict[str, GreyImage]:
-        """The median of frames spread over the track; of cameras that have enough of them."""
+    def _static(self, pulses: range) -> dict[str, Background]:
+        """The static scene in frames spread over the track; of cameras that have enough of them."""
         spread = pulses[:: max(1, len(pulses) // _BACKGROUND)]
         stacks: dict[str, list[Grey]] = {}
         for pulse in spread:
             for name, image in self._frames(pulse).items():
                 stacks.setdefault(name, []).append(image)
         return {
-            name: np.median(np.stack(images).astype(np.float32), axis=0).astype(np.float32)
+            name: Background(static_image(name, images))
             for name, images in stacks.items()
             if len(images) >= _BACKGROUND // 2
         }

@@ -62,7 +62,11 @@ def ski_views(log: OpenedLog, system: CameraSystem, pulse: int, velocity: Floats
     """
     frames, nothing = log.frames(pulse), log.unmeasured
     views = [
-        SkiView(system[name], partial(background.part, frames[name]), nothing.late_s(name) * velocity)
+        SkiView(
+            system[name].shifted(background.shift(frames[name])),
+            partial(background.part, frames[name]),
+            nothing.late_s(name) * velocity,
+        )
         for name, background in log.backgrounds().items()
         if name in frames and name in system.names
     ]

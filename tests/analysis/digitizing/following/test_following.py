@@ -1,6 +1,7 @@
 """A hand-made start is carried through the jump; what cannot be told is not kept, and a person's own marks stay."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from analysis.digitizing.refining.click import refined
 from bench.analysis.hill_logs import HillLog
 from rig.api.digitizing import MarkSource, PlaceAction, RefineOrder, TrackOrder, UndoAction
 from rig.errors import BadInputError, NoFitError
-from tests.analysis.digitizing.hill import clicks, followed
+from simrig.world.scenario import load_scenario
+from tests.analysis.digitizing.hill import SCATTER_PX, clicks, followed, opened, placed
+from tests.support.kept import kept_hill_log
 
 START = 20
 THINGS = ["P1", "P2", "P3", "P4", "right ski", "left ski"]
@@ -44,6 +47,36 @@ def test_a_start_by_hand_is_carried_through_thirty_pulses(desk: Desk, jump: Hill
     for _ in range(2):
         desk.act("Anna", UndoAction(do="undo"))
     assert dict(desk.session("Anna").everything()) == by_hand
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1000, 1003])
+def test_a_start_by_hand_is_carried_through_a_hard_day(tmp_path: Path, seed: int) -> None:
+    """Cameras shake, clouds pass, it snows, and two people stand behind him."""
+    scenario = load_scenario(Path("config/scenarios/hard.toml")).model_copy(update={"stamp": False, "seed": seed})
+    log = placed(kept_hill_log(scenario, range(18, 66)), tmp_path)
+    desk, random = opened(log), np.random.default_rng(seed)
+    images, names = log.truth[START + 10]["images"], ("P1", "P2", "P3")
+    for camera, places in images.items():
+        for name in names:
+            xy = np.array(places[name]) + random.normal(0, SCATTER_PX, 2)
+            where = {"pulse": START + 10, "camera": camera, "thing": name, "xy": tuple(xy.tolist())}
+            desk.act("Anna", PlaceAction(do="place", sigma=(SCATTER_PX, SCATTER_PX), **where))
+    marked = dict(desk.session("Anna").everything())
+    for direction in (1, -1):
+        order = TrackOrder(things=list(names), pulse=START + 10, direction=direction, most=18)
+        followed(desk, "Anna", order)
+    errors = []
+    for key, entered in desk.session("Anna").everything():
+        true = log.truth[key.pulse]["images"][key.camera][key.thing]
+        if key not in marked and true is not None:
+            assert entered.xy is not None
+            assert entered.sigma is not None
+            errors.append(np.subtract(entered.xy, true) / entered.sigma)
+    desk.close()
+    assert len(errors) > 0.9 * 3 * 3 * 30  # three points, three images, 30 pulses
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5  # those of one start are shared by all its pulses
+    assert np.abs(errors).max() < 5
 
 
 def test_what_is_not_marked_is_not_followed(desk: Desk) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ def test_nothing_is_given_out_that_no_image_shows() -> None:
         images = of.frames(pulse)
         return images if pulse <= start + 3 else {name: np.full_like(image, 120) for name, image in images.items()}
 
-    tracker = Tracker(blind, RATE_HZ, of.system, of.frames(30))
+    tracker = Tracker(blind, RATE_HZ, of.system, of.background(30))
     (track,) = tracker.track({start: of.marks(start, "P1")}, start, 1, FEW)
     assert list(track.places) == [start + 1, start + 2, start + 3]
     assert track.last == start + 3
@@ -50,7 +51,9 @@ def test_nothing_is_given_out_that_no_image_shows() -> None:
 def test_a_lost_frame_is_bridged() -> None:
     of = hill(21)
     start = _start(of, "P1")
-    tracker = Tracker(lambda pulse: {} if pulse == start + 3 else of.frames(pulse), RATE_HZ, of.system, of.frames(30))
+    tracker = Tracker(
+        lambda pulse: {} if pulse == start + 3 else of.frames(pulse), RATE_HZ, of.system, of.background(30)
+    )
     (track,) = tracker.track({start: of.marks(start, "P1")}, start, 1, FEW)
     assert start + 3 not in track.places
     assert start + FEW in track.places
@@ -164,6 +167,31 @@ def test_thirty_pulses_are_carried_with_honest_sigmas(markers: bool) -> None:
     assert 0.8 < np.sqrt((joined**2).mean()) < 1.3
     assert np.abs(joined).max() < 5
     assert np.mean(np.array(lengths) >= 28) > 0.7
+
+
+def test_shaking_cameras_and_changing_light_do_not_end_a_track() -> None:
+    """Every frame is off by some tenths of a px and a fifth brighter or darker; marks are where the frames show it."""
+    of, random = hill(21), np.random.default_rng(5)
+    start = _start(of, "P1")
+    pulses = range(start - FEW, start + FEW + 1)
+    shifts = {(pulse, name): random.normal(0, 0.4, 2) for pulse in pulses for name in NAMES}
+    light = {key: random.uniform(0.75, 1.05) for key in shifts}
+
+    def shown(pulse: int) -> dict[str, NDArray[np.uint8]]:
+        frames = {}
+        for name, image in of.frames(pulse).items():
+            move = np.column_stack((np.eye(2), shifts[pulse, name]))
+            moved = cv2.warpAffine(image, move, image.shape[::-1], flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
+            frames[name] = np.clip(np.rint(light[pulse, name] * moved), 0, 255).astype(np.uint8)
+        return frames
+
+    marks = {name: replace(mark, xy=mark.xy + shifts[start, name]) for name, mark in of.marks(start, "P1").items()}
+    (track,) = Tracker(shown, RATE_HZ, of.system).track({start: marks}, start, 1, FEW)
+    assert list(track.places) == [start + k for k in range(1, FEW + 1)], track.stopped
+    for pulse, places in track.places.items():
+        for name, place in places.items():
+            off = place.xy - shifts[pulse, name] - of.true(pulse, name, "P1")
+            assert np.abs(off / place.sigma).max() < 4, (pulse, name)
 
 
 def test_a_mark_has_a_sigma_that_the_track_keeps() -> None:

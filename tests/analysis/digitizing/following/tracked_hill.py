@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.candidates.foreground.background import Background
 from analysis.digitizing.following.points.tracker import Tracker
 from analysis.digitizing.following.points.tracks import Mark, Track
+from analysis.scene.static_image import static_image
 from bench.analysis.simulated import drawn, true_cameras
 from rig.arrays import Floats
 from rig.pulse import HillPulse
@@ -50,6 +52,10 @@ class TrackedHill:
             for name, view in zip(NAMES, self._views, strict=True):
                 view.render_into(self._images[pulse][name], HillPulse(pulse))
         return self._images[pulse]
+
+    def background(self, pulse: int) -> dict[str, Background]:
+        """The static scene as the frames of one pulse show it."""
+        return {name: Background(static_image(name, [image])) for name, image in self.frames(pulse).items()}
 
     def true(self, pulse: int, camera: str, thing: str) -> Floats:
         """Where a thing is, px; NaN outside the image."""

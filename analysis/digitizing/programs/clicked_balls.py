@@ -23,6 +23,19 @@ from rig.phrase import phrase
 _FEWEST_BALLS: Final = 4
 
 
+def clicks_can_help(sizes: Mapping[str, tuple[int, int]], source: Source) -> bool:
+    """Whether clicked balls can orient a camera: there is a survey, and it has one of the log, for such images.
+
+    Args:
+        sizes: width and height of the images by camera, px.
+        source: survey or poses.
+    """
+    try:
+        return isinstance(source, Survey) and bool(source.cameras_of(sizes)[0])
+    except BadInputError:
+        return False
+
+
 def orient_by_clicks(
     sizes: Mapping[str, tuple[int, int]], source: Source, marks: Mapping[Key, Entered]
 ) -> tuple[CameraSystem, list[str]]:

@@ -14,21 +14,23 @@ if TYPE_CHECKING:
 
 def _orient(order: "OrientingOrder", _: Path, __: Teller) -> "OrientedCameras":
     from analysis.cameras.frames import LogFrames  # noqa: PLC0415 - its libraries start their threads with our priority
-    from analysis.digitizing.programs.clicked_balls import orient_by_clicks  # noqa: PLC0415
+    from analysis.digitizing.programs.clicked_balls import clicks_can_help, orient_by_clicks  # noqa: PLC0415
     from analysis.digitizing.programs.orienting import OrientedCameras  # noqa: PLC0415
     from analysis.procedure.log_facts import log_facts  # noqa: PLC0415
     from analysis.procedure.orienting import oriented  # noqa: PLC0415
     from analysis.scene.static_image import static_images  # noqa: PLC0415
 
+    sizes = {name: camera.size for name, camera in log_facts(order.log).cameras.items()}
     if order.marks is None:
         try:
             found = oriented(static_images(order.log), order.source, LogFrames(order.log))
         except SvevError as error:
+            if not clicks_can_help(sizes, order.source):
+                raise
             text = "{why}; or click four or more balls in each image, and orient by them"
             raise BadInputError(phrase("hand_or_click", text, why=error.said)) from None
         findings = [*found.scene.messages, *(move.said for move in found.steadiness.moved)]
         return OrientedCameras(found.scene.system, tuple(findings), by_clicks=False)
-    sizes = {name: camera.size for name, camera in log_facts(order.log).cameras.items()}
     system, notes = orient_by_clicks(sizes, order.source, order.marks)
     return OrientedCameras(system, tuple(map(plain, notes)), by_clicks=True)
 

@@ -1,6 +1,7 @@
 """An operator measures a jump: what follows in space is true, also while he drags, and nothing of it is lost."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -228,6 +229,31 @@ def test_without_a_survey_images_are_measured_and_nothing_in_space(jump: HillLog
         desk.geometry("Anna", 20, "K1", "P1", (10, 20))
     with pytest.raises(StateForbidsError, match="nothing can be computed in space"):
         desk.programs.compute("Anna")
+    desk.close()
+
+
+def test_a_survey_of_other_cameras_says_which_it_has_and_proposes_no_clicks(jump: HillLog, tmp_path: Path) -> None:
+    names = re.sub(r'"K(\d)"', r'"camera \1"', jump.survey.read_text())
+    survey = tmp_path / "other.json"
+    survey.write_text(names)
+    desk = opened(replace(jump, survey=survey))
+    state = desk.opening().orientation
+    assert state.state == "failed"
+    assert "has none of the log's cameras K1, K2, K3 (there: camera 1, camera 2, camera 3)" in str(state.message)
+    assert "click" not in str(state.message)
+    desk.close()
+
+
+def test_a_log_that_is_being_written_is_measured_as_far_as_it_goes(jump: HillLog, tmp_path: Path) -> None:
+    whole = jump.path.read_bytes()
+    growing = tmp_path / "growing.mcap"
+    growing.write_bytes(whole[: len(whole) // 2])
+    desk = opened(replace(jump, path=growing), survey=False)
+    assert 10 < len(desk.log.pulses) < len(jump.truth)
+    last = desk.log.pulses[-1]
+    action = PlaceAction(do="place", pulse=last, camera="K2", thing="P1", xy=(10, 20))
+    assert desk.act("Anna", action).touched is not None
+    assert desk.log.png(last, "K2").startswith(b"\x89PNG")
     desk.close()
 
 

@@ -17,6 +17,8 @@ from rig.images.pixels import Stored
 
 #: Formats of FFmpeg whose first plane is grey, or luma that stands in two bytes with the lower one first.
 _LUMA_FIRST: Final = ("gray", "yuv", "nv")
+#: Formats whose only plane holds luma in every other byte, from this one on.
+_LUMA_BETWEEN: Final = {"yuyv422": 0, "yvyu422": 0, "uyvy422": 1}
 #: `AVCOL_RANGE_JPEG` of FFmpeg: luma takes all values.
 _FULL_RANGE: Final = 2
 
@@ -56,12 +58,13 @@ def grey_of(frame: VideoFrame) -> Stored:
     """
     name, bits = frame.format.name, bits_of(frame)
     whole_numbers = frame.format.components[0].bits <= 16
-    if not name.startswith(_LUMA_FIRST) or frame.format.is_big_endian or not whole_numbers:
+    every, first = (2, _LUMA_BETWEEN[name]) if name in _LUMA_BETWEEN else (1, 0)
+    if not name.startswith((*_LUMA_FIRST, *_LUMA_BETWEEN)) or frame.format.is_big_endian or not whole_numbers:
         return _scaled_from_colours(frame, bits)
     plane = frame.planes[0]
     kind: np.dtype[np.unsignedinteger[Any]] = np.dtype(np.uint8) if bits == 8 else np.dtype("<u2")
     lines: Stored = np.frombuffer(memoryview(plane), kind, plane.line_size // kind.itemsize * plane.height)
-    values = lines.reshape(plane.height, -1)[: frame.height, : frame.width]
+    values = lines.reshape(plane.height, -1)[: frame.height, first : every * frame.width : every]
     if name.startswith(("gray", "yuvj")) or frame.color_range == _FULL_RANGE:
         return np.ascontiguousarray(values)
     spread: Stored = _spread(bits)[values & ((1 << bits) - 1)]

@@ -38,11 +38,15 @@ def write_video(
     stored: str = "gray",
     ticks: Sequence[int] | None = None,
     metadata: dict[str, str] | None = None,
+    options: dict[str, str] | None = None,
 ) -> Path:
-    """A video of these frames; `ticks` are their times in thousandths of a second, otherwise they come evenly."""
+    """A video of these frames; `ticks` are their times in thousandths of a second, otherwise they come evenly.
+
+    `options` are those of the codec.
+    """
     with av.open(str(path), "w") as file:
         file.metadata.update(metadata or {})
-        stream = file.add_stream(codec, rate=rate)
+        stream = file.add_stream(codec, rate=rate, options=options)
         assert isinstance(stream, VideoStream)
         stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
         stream.width, stream.height, stream.pix_fmt = frames[0].shape[1], frames[0].shape[0], stored

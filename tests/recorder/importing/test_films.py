@@ -1,5 +1,6 @@
 """Folders and videos give their frames by number, in grey, and say what is wrong with them."""
 
+import struct
 from pathlib import Path
 
 import cv2
@@ -15,7 +16,7 @@ from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.images.pixels import Stored
 from rig.settings.file import CONFIG, load_rig
-from tests.recorder.importing.films import picture, write_folder, write_video
+from tests.recorder.importing.films import SIZE, picture, write_folder, write_video
 
 FRAMES = [picture(number) for number in range(1, 11)]
 
@@ -118,7 +119,15 @@ def test_a_video_without_loss_gives_its_pixels(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("stored", "bits"), [("yuv420p", 8), ("yuv420p10le", 10), ("gbrp10le", 10), ("gray12le", 12), ("bgr0", 8)]
+    ("stored", "bits"),
+    [
+        ("yuv420p", 8),
+        ("yuv420p10le", 10),
+        ("yuv422p10le", 10),
+        ("gbrp10le", 10),
+        ("gray12le", 12),
+        ("bgr0", 8),
+    ],
 )
 def test_luma_is_spread_over_all_values(stored: str, bits: int, tmp_path: Path) -> None:
     ramp = np.tile(np.arange(256, dtype=np.uint8), (48, 1))
@@ -146,6 +155,34 @@ def test_a_frame_that_was_dropped_is_lost_and_those_behind_it_keep_their_numbers
     assert f"frames left out among its times: {len(dropped)}; these frames are lost" in film.remarks
     assert not any("evenly" in remark for remark in film.remarks)
     assert next(film.frames(dropped[0])).status is FrameStatus.LOST
+
+
+@pytest.mark.parametrize("stored", ["uyvy422", "yuyv422", "nv12"])
+def test_pixels_of_cameras_without_compression_are_their_luma(stored: str, tmp_path: Path) -> None:
+    ramp = np.tile(np.arange(256, dtype=np.uint8), (48, 1))
+    film = Video(write_video(tmp_path / "K1.avi", [ramp] * 3, codec="rawvideo", stored=stored), 50)
+    assert (film.bits, film.kind) == (8, f"video, rawvideo, {stored}")
+    assert np.abs(pixels_of(film, 1) - ramp.astype(float)).max() < 1.6
+
+
+def test_interlaced_frames_are_said(tmp_path: Path) -> None:
+    options = {"flags": "+ildct", "x264-params": "tff=1"}
+    path = write_video(tmp_path / "K1.mkv", FRAMES, codec="libx264", stored="yuv420p", options=options)
+    assert any(remark.startswith("its frames are interlaced") for remark in Video(path, 50).remarks)
+
+
+def test_a_phone_held_upright_gives_frames_as_its_camera_had_them(tmp_path: Path) -> None:
+    """The file asks to be shown turned by a matrix in its track's header (ISO 14496-12, 8.3.2)."""
+    path = write_video(tmp_path / "K1.mp4", FRAMES, codec="libx264", stored="yuv420p")
+    content = path.read_bytes()
+    matrix = content.index(b"tkhd") + 4 + 40
+    turned = struct.pack(">9i", 0, 1 << 16, 0, -(1 << 16), 0, 0, 0, 0, 1 << 30)
+    assert struct.unpack(">9i", content[matrix : matrix + 36]) == (1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30)
+    path.write_bytes(content[:matrix] + turned + content[matrix + 36 :])
+    film = Video(path, 50)
+    assert film.size == SIZE
+    assert next(film.frames(1)).pixels.shape == SIZE[::-1]  # type: ignore[union-attr]
+    assert any("turned by -90 degrees" in remark for remark in film.remarks)
 
 
 def test_frames_that_do_not_come_evenly_are_said(tmp_path: Path) -> None:

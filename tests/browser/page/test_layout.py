@@ -10,6 +10,7 @@ from playwright.sync_api import TimeoutError as NotInTimeError
 from rig.api.statement import Level, Statement
 from rig.api.status import Alarm, State
 from tests.browser.conftest import MEASURED, Open
+from tests.browser.touch import Fingers
 from tests.browser.views import BROKEN, READY, enter
 from tests.support.repeats import repeats
 from tests.support.waiting import wait_until
@@ -143,11 +144,7 @@ def _swiped(page: Page, distance: int, camera: str) -> bool:
     assert box
     assert box["height"] > 200
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    touch = page.context.new_cdp_session(page)
-    for kind, moved in (("touchStart", 0.0), ("touchMove", distance / 2), ("touchMove", float(distance))):
-        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x + moved, "y": y}]})
-    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    touch.detach()
+    Fingers(page).swipe((x, y), distance)
     try:
         expect(shown).not_to_have_text([before], timeout=5000)
     except AssertionError:

@@ -1,71 +1,24 @@
-"""A measured jump on its page: the stick figure over the pictures, curves that move the video, a phone's controls."""
+"""A measured jump on its page: the stick figure over the pictures, curves that move the video."""
 
 import json
 import re
-import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from analysis.cameras.standing import Standing
-from analysis.report.overlay_file import write_overlay
-from analysis.result import file as result_file
-from analysis.worker.findings import summary
-from service.measuring.keeping import keep_result
-from tests.analysis.report.jumps import jump_log, measured_recording
-from tests.analysis.simulated import RATE_HZ, SIZE, true_cameras
+from tests.analysis.simulated import RATE_HZ, SIZE
 from tests.browser.conftest import Open
-from tests.browser.views import AXE, assert_fits_a_phone
+from tests.browser.recordings.conftest import FIRST, TAKEOFF, WATCH, shows
 from tests.support.waiting import wait_until
-from tests.webpanel.memory_service import MemoryService
 from tests.webpanel.serving import Panel
-
-TAKEOFF = 30
-FIRST = 22  #: pulse of the log
-#: Notes which pulses are shown, from now on.
-WATCH = """() => {
-    window.seen = [];
-    const where = document.getElementById("frame-where");
-    new MutationObserver(() => seen.push(parseInt(where.textContent))).observe(where, { childList: true });
-}"""
-#: How far down the controls in sight stand.
-ROWS = """() => [...document.querySelectorAll("#player :is(button, select, input, a)")]
-    .filter(e => e.checkVisibility() && !e.closest(".viewer, .curves") && e.id !== "frame-full")
-    .map(e => Math.round(e.getBoundingClientRect().top))"""
-
-
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A log with rendered images of a jump; its result lies beside it."""
-    log = tmp_path_factory.mktemp("log") / "jump.mcap"
-    log.symlink_to(jump_log(1))
-    made, result = log.parent / "made", measured_recording()
-    made.mkdir()
-    result_file.write(result, made / "jumper.json")
-    write_overlay(result, {1: Standing(true_cameras(), {})}, made / "overlay.json")
-    keep_result(made, log, (summary("jump", RATE_HZ, result.jumps[0], None),))
-    return log
-
-
-@pytest.fixture
-def overlay(service: MemoryService, measured: Path) -> Path:
-    """What is drawn of the jump; its log and result are in the folder of the recordings."""
-    folder = service.catalogue.directory
-    shutil.copy(measured, folder / "jump.mcap")
-    shutil.copytree(measured.with_suffix(".measured"), folder / "jump.measured")
-    return folder / "jump.measured" / "overlay.json"
 
 
 def _drawn(overlay: Path, pulse: int) -> dict[str, Any]:
     (jump,) = json.loads(overlay.read_text())["jumps"]
     found: dict[str, Any] = next(each for each in jump["pulses"] if each["pulse"] == pulse)
     return found
-
-
-def _shows(page: Page, pulse: int) -> None:
-    expect(page.locator("#frame-where")).to_have_text(re.compile(f"^{pulse} / "))
 
 
 def _middle(part: Locator) -> tuple[float, float]:
@@ -88,7 +41,7 @@ def _lies_on_the_picture(page: Page, overlay: Path, pulse: int) -> None:
 
 def test_stick_figure_and_curves_follow_the_video_and_move_it(panel: Panel, overlay: Path, open_page: Open) -> None:
     page = open_page(f"{panel.url}/#/recordings/jump", width=1280, height=900)
-    _shows(page, TAKEOFF)
+    shows(page, TAKEOFF)
     expect(page.locator("#jump-verdict")).to_have_text("Measured well")
     expect(page.locator("#curves-where")).to_have_text("0.00\u202fs  ·  0.0\u202fm")
     expect(page.locator("#frames img:not(.ghost)")).to_have_js_property("complete", True)
@@ -115,14 +68,14 @@ def test_stick_figure_and_curves_follow_the_video_and_move_it(panel: Panel, over
     page.mouse.move(where["x"] + 0.52 * where["width"], where["y"] + 20, steps=3)
     page.mouse.up()
     middle = 41  # of pulses 23 to 58
-    _shows(page, middle)
+    shows(page, middle)
     plot.press("ArrowRight")
-    _shows(page, middle + 1)
+    shows(page, middle + 1)
     plot.press("End")
-    _shows(page, 58)
+    shows(page, 58)
     expect(plot).to_have_attribute("aria-valuenow", "58")
     page.locator("#frame-slider").fill("15")
-    _shows(page, FIRST + 15)
+    shows(page, FIRST + 15)
     expect(plot).to_have_attribute("aria-valuenow", str(FIRST + 15))
     assert _middle(plot.locator("i"))[0] == pytest.approx(where["x"] + where["width"] * 14 / 35, abs=3)
     page.keyboard.press("Home")  # nobody is in sight yet
@@ -131,7 +84,7 @@ def test_stick_figure_and_curves_follow_the_video_and_move_it(panel: Panel, over
     page.locator("#frame-moment").click()
     page.locator("#frame-stick").click()
     page.reload()
-    _shows(page, TAKEOFF)
+    shows(page, TAKEOFF)
     expect(page.locator("#frame-stick")).to_have_attribute("aria-pressed", "false")
     expect(page.locator(".curve")).to_have_count(8)
     expect(page.locator(".stick")).to_have_count(0)
@@ -141,7 +94,7 @@ def test_stick_figure_and_curves_follow_the_video_and_move_it(panel: Panel, over
 
 def test_one_tap_loops_the_take_off_in_slow_motion(panel: Panel, overlay: Path, open_page: Open) -> None:
     page = open_page(f"{panel.url}/#/recordings/jump")
-    _shows(page, TAKEOFF)
+    shows(page, TAKEOFF)
     page.evaluate(WATCH)
     page.locator("#frame-loop").click()
     expect(page.locator("#frame-speed")).to_have_value("5")
@@ -167,59 +120,4 @@ def test_a_result_of_an_older_version_says_why_there_is_no_stick_figure(
     expect(page.locator("#stick-missing")).to_contain_text("Mål det på nytt")
     expect(page.locator("#curves")).to_be_hidden()
     expect(page.locator("#frame-stick")).to_be_hidden()
-    _shows(page, TAKEOFF)
-
-
-@pytest.mark.parametrize("locale", ["en-GB", "nb-NO"])
-def test_a_phone_shows_one_camera_in_full_width_with_two_rows_of_controls(
-    panel: Panel, overlay: Path, open_page: Open, locale: str
-) -> None:
-    page = open_page(
-        f"{panel.url}/#/recordings/jump", width=360, height=780, locale=locale, has_touch=True, is_mobile=True
-    )
-    _shows(page, TAKEOFF)
-    expect(page.locator(".curve:visible")).to_have_count(2)
-    picture = page.locator("#frames").bounding_box()
-    assert picture is not None
-    assert picture["width"] > 300
-    assert picture["height"] > 220
-    rows = page.evaluate(ROWS)
-    assert len(set(rows)) == 2
-    assert_fits_a_phone(page)
-    names = page.locator("#frames .block")
-    expect(names.nth(0)).to_be_visible()
-    _swipe(page, picture, -120)
-    expect(names.nth(1)).to_be_visible()
-    expect(names.nth(0)).to_be_hidden()
-    _swipe(page, picture, 120)
-    expect(names.nth(0)).to_be_visible()
-    plot = page.locator("[data-curve=speed] .plot")
-    plot.scroll_into_view_if_needed()
-    where = plot.bounding_box()
-    assert where is not None
-    page.touchscreen.tap(where["x"] + 0.52 * where["width"], where["y"] + 20)
-    _shows(page, 41)
-    page.locator("#curves-all").click()
-    expect(page.locator(".curve:visible")).to_have_count(8)
-    page.locator("#frame-more").click()
-    expect(page.locator("#frame-cameras")).to_be_visible()
-    assert_fits_a_phone(page)
-    page.evaluate(AXE.read_text())
-    assert page.evaluate("axe.run().then(found => found.violations.map(each => each.id))") == []
-    page.locator("#frame-full").click()
-    expect(page.locator("#frame-full")).to_have_attribute("aria-pressed", "true")
-    assert page.evaluate("document.fullscreenElement.id") == "player"
-    page.locator("#frame-full").click()
-    expect(page.locator("#frame-full")).to_have_attribute("aria-pressed", "false")
-
-
-def _swipe(page: Page, picture: Any, pixels: int) -> None:
-    """A finger goes over the picture, as the browser tells the page."""
-    x, y = picture["x"] + picture["width"] / 2, picture["y"] + picture["height"] / 2
-    session = page.context.new_cdp_session(page)
-    steps = [(x + pixels * share, y) for share in (0.0, 0.3, 0.6, 1.0)]
-    for k, (to, at) in enumerate(steps):
-        kind = "touchMove" if k else "touchStart"
-        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": to, "y": at}]})
-    session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    session.detach()
+    shows(page, TAKEOFF)

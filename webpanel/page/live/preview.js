@@ -4,11 +4,11 @@ import { say, t } from "../i18n/i18n.js";
 import { hear, wantPicture } from "../shared/connection.js";
 import { $, make, setText } from "../shared/dom.js";
 import { known, watch } from "../shared/store.js";
+import { onSwipe } from "../shared/swipe.js";
 import { makeViewer } from "../shared/viewer.js";
 
 /** The window is too narrow for all cameras side by side: one is shown large, the others by swiping. */
 const NARROW = matchMedia("(max-width: 599px)");
-const SWIPE_PX = 40;
 const USUAL_ROWS = 480;
 const USUAL_COLUMNS = 640;
 
@@ -16,8 +16,6 @@ const USUAL_COLUMNS = 640;
 let viewer;
 let running = false;
 let cameras = 0;
-/** Where the finger was put down; null: it was not. @type {number|null} */
-let touchedAt = null;
 let ratio = 0;
 /** Says that the picture that was set last is shown. */
 let shown = () => {};
@@ -33,8 +31,7 @@ export function startPreview() {
     draw();
   });
   hear({ picture: show, noPicture: (why) => { refused = why; draw(); } });
-  $("preview").addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => { touchedAt = event.pointerType === "mouse" ? null : event.clientX; });
-  $("preview").addEventListener("pointerup", (/** @type {PointerEvent} */ event) => swiped(event.clientX - (touchedAt ?? event.clientX)));
+  onSwipe($("preview"), swiped);
   NARROW.addEventListener("change", () => { viewer.select(NARROW.matches ? 0 : null); draw(); });
   watch(draw);
 }
@@ -54,12 +51,11 @@ export function shownCamera() {
   return viewer.selected();
 }
 
-/** @param {number} pixels to the right */
-function swiped(pixels) {
-  touchedAt = null;
+/** @param {1|-1} step */
+function swiped(step) {
   const selected = viewer.selected();
-  if (selected === null || Math.abs(pixels) < SWIPE_PX) return;
-  viewer.select((selected + (pixels < 0 ? 1 : -1) + cameras) % cameras);
+  if (selected === null) return;
+  viewer.select((selected + step + cameras) % cameras);
   draw();
 }
 

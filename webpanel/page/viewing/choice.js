@@ -9,10 +9,20 @@
 
 import { t } from "../i18n/i18n.js";
 import { $, make } from "../shared/dom.js";
+import { onSwipe } from "../shared/swipe.js";
 
 /** The window is too narrow for all cameras side by side. */
 const NARROW = matchMedia("(max-width: 599px)");
-const SWIPE_PX = 40;
+
+/**
+ * Let the player fill the screen; the window where a browser gives nobody the screen, as on iPhones.
+ *
+ * @param {boolean} filling
+ */
+function fill(filling) {
+  $("player").classList.toggle("filling", filling);
+  $("frame-full").setAttribute("aria-pressed", String(filling));
+}
 
 /**
  * @param {import("../shared/viewer.js").Viewer} viewer
@@ -23,8 +33,6 @@ const SWIPE_PX = 40;
 export function makeChoice(viewer, frame, changed) {
   /** @type {string[]} */
   let names = [];
-  /** Where the finger was put down; null: it was not, or there are two. @type {number|null} */
-  let touchedAt = null;
 
   /** @param {number|null} index */
   function choose(index) {
@@ -40,19 +48,19 @@ export function makeChoice(viewer, frame, changed) {
     )));
   }
 
-  frame.addEventListener("pointerdown", (event) => { touchedAt = event.pointerType === "mouse" || !event.isPrimary ? null : event.clientX; });
-  frame.addEventListener("pointerup", (event) => {
-    const pixels = event.clientX - (touchedAt ?? event.clientX);
+  onSwipe(frame, (step) => {
     const selected = viewer.selected();
-    touchedAt = null;
-    if (selected === null || Math.abs(pixels) < SWIPE_PX || frame.classList.contains("zoomed")) return;
-    choose((selected + (pixels < 0 ? 1 : -1) + names.length) % names.length);
+    if (selected !== null && !frame.classList.contains("zoomed")) choose((selected + step + names.length) % names.length);
   });
-  NARROW.addEventListener("change", () => { if (names.length) choose(NARROW.matches ? 0 : null); });
+  // A phone that is turned goes on with the camera that is looked at.
+  NARROW.addEventListener("change", () => { if (NARROW.matches && names.length && viewer.selected() === null) choose(0); });
 
-  $("frame-full").hidden = !document.fullscreenEnabled;
-  $("frame-full").addEventListener("click", () => void (document.fullscreenElement ? document.exitFullscreen() : $("player").requestFullscreen()));
-  document.addEventListener("fullscreenchange", () => $("frame-full").setAttribute("aria-pressed", String(document.fullscreenElement !== null)));
+  $("frame-full").addEventListener("click", () => {
+    if (!document.fullscreenEnabled) fill(!$("player").classList.contains("filling"));
+    else void (document.fullscreenElement ? document.exitFullscreen() : $("player").requestFullscreen());
+  });
+  document.addEventListener("fullscreenchange", () => fill(document.fullscreenElement !== null));
+  addEventListener("hashchange", () => { if (!document.fullscreenEnabled) fill(false); });
   $("frame-more").addEventListener("click", () => $("frame-more").setAttribute("aria-expanded", String($("player").classList.toggle("more"))));
 
   return {

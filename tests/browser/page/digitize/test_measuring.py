@@ -10,6 +10,7 @@ from playwright.sync_api import Page, expect
 from rig.arrays import Floats
 from tests.browser.conftest import Open
 from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, canvas_of, enter, screen, seen, settled
+from tests.browser.touch import Fingers
 
 #: Colour of the curves that come from K1, as `overlay.js` has it.
 RED = np.array([255, 107, 107])
@@ -132,32 +133,27 @@ def test_a_jump_measured_with_keys_alone(desk: Desk, open_page: Open) -> None:
     page.keyboard.press("p")
 
 
-def test_a_finger_places_where_the_loupe_shows_and_two_fingers_enlarge(desk: Desk, open_page: Open) -> None:
-    page = enter(open_page, desk, width=820, height=1100, has_touch=True)
-    client = page.context.new_cdp_session(page)
+@pytest.mark.parametrize("size", [(360, 780), (820, 1100)], ids=["phone", "tablet"])
+def test_a_finger_places_where_the_loupe_shows_and_two_fingers_enlarge(
+    desk: Desk, open_page: Open, size: tuple[int, int]
+) -> None:
+    page = enter(open_page, desk, width=size[0], height=size[1], has_touch=True, is_mobile=True)
+    fingers = Fingers(page)
     box = canvas_of(page, "K1")
-    middle = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
-
-    def touch(kind: str, *places: Any) -> None:
-        points = [{"x": float(x), "y": float(y), "id": index} for index, (x, y) in enumerate(places)]
-        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-
-    touch("touchStart", middle)
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    fingers.down((x, y))
     for step in range(1, 6):
-        touch("touchMove", np.add(middle, [6 * step, 0]))
+        fingers.move((x + 6 * step, y))
     settled(page)
     assert desk.mark("K1", "P1") is None, "while the finger is down"
-    touch("touchEnd")
+    fingers.up()
     expect(_thing(page, "P2")).to_have_attribute("aria-pressed", "true")
     desk.wait_for(1)
     mark = desk.mark("K1", "P1")
     assert mark is not None
-    assert np.abs(screen(page, "K1", np.array(mark["xy"])) - np.add(middle, [30, 0])).max() < 0.05
-    touch("touchStart", np.subtract(middle, [40, 0]))
-    touch("touchStart", np.subtract(middle, [40, 0]), np.add(middle, [40, 0]))
-    for step in range(1, 6):
-        touch("touchMove", np.subtract(middle, [40 + 16 * step, 0]), np.add(middle, [40 + 16 * step, 0]))
-    touch("touchEnd")
+    assert np.abs(screen(page, "K1", np.array(mark["xy"])) - (x + 30, y)).max() < 0.05
+    fingers.down((x - 40, y))
+    fingers.drag(((x - 40, y), (x - 120, y)), ((x + 40, y), (x + 120, y)))
     expect(page.locator(".pane.active .pane-where")).to_contain_text(re.compile(r"3\.\d\u00d7"))
     assert desk.session()["revision"] == 1, "two fingers measure nothing"
 

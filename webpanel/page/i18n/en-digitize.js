@@ -88,7 +88,7 @@ export const words = {
   "digitize.set_not_visible": "Not visible",
   "digitize.set_guess": "Guess",
   "digitize.remove": "Remove",
-  "digitize.numbers": "In space",
+  "digitize.numbers": "In space, m",
   "digitize.numbers_none": "Measure a thing in two views.",
   "digitize.only_images": "The cameras are not oriented: only images are measured.",
   "digitize.live": "at the pointer",

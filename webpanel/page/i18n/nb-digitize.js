@@ -88,7 +88,7 @@ export const words = {
   "digitize.set_not_visible": "Ikke synlig",
   "digitize.set_guess": "Gjetning",
   "digitize.remove": "Fjern",
-  "digitize.numbers": "I rommet",
+  "digitize.numbers": "I rommet, m",
   "digitize.numbers_none": "Mål en ting i to bilder.",
   "digitize.only_images": "Kameraene er ikke orientert: bare bilder måles.",
   "digitize.live": "ved pekeren",

@@ -56,6 +56,7 @@ def test_a_point_in_three_views_with_curves_and_a_mistake(desk: Desk, open_page:
     off = np.array(found["X"]) - desk.log.truth[PULSE]["points"]["P1"]
     assert (np.abs(off) < 5 * np.array(found["sigma"])).all()
     expect(page.locator("#findings")).to_be_empty()
+    box = canvas_of(page, "K2")
     page.mouse.move(*where["K2"])
     page.mouse.down()
     page.mouse.move(*np.add(where["K2"], [4, 20]), steps=4)
@@ -63,9 +64,12 @@ def test_a_point_in_three_views_with_curves_and_a_mistake(desk: Desk, open_page:
     page.mouse.up()
     expect(page.locator("#findings")).to_contain_text("K2's P1 does not fit")
     expect(page.locator('[data-of="P1"] [data-fit="wrong"]').first).to_be_visible()
+    assert canvas_of(page, "K2") == box, "what is told moves no picture"
     page.locator("#undo").click()
     expect(page.locator("#findings")).to_be_empty()
     page.locator("#tape").click()
+    expect(page.locator("#tape-says")).to_be_visible()
+    assert canvas_of(page, "K2") == box
     for camera in ("K1", "K2"):
         page.mouse.click(*screen(page, camera, desk.true(camera, "P3")))
     for camera in ("K1", "K2"):
@@ -133,10 +137,11 @@ def test_a_jump_measured_with_keys_alone(desk: Desk, open_page: Open) -> None:
     page.keyboard.press("p")
 
 
-@pytest.mark.parametrize("size", [(360, 780), (820, 1100)], ids=["phone", "tablet"])
+@pytest.mark.parametrize(("size", "enlarged"), [((360, 780), "1.6"), ((820, 1100), "3.7")], ids=["phone", "tablet"])
 def test_a_finger_places_where_the_loupe_shows_and_two_fingers_enlarge(
-    desk: Desk, open_page: Open, size: tuple[int, int]
+    desk: Desk, open_page: Open, size: tuple[int, int], enlarged: str
 ) -> None:
+    """Three times as large as the whole picture."""
     page = enter(open_page, desk, width=size[0], height=size[1], has_touch=True, is_mobile=True)
     fingers = Fingers(page)
     box = canvas_of(page, "K1")
@@ -154,7 +159,7 @@ def test_a_finger_places_where_the_loupe_shows_and_two_fingers_enlarge(
     assert np.abs(screen(page, "K1", np.array(mark["xy"])) - (x + 30, y)).max() < 0.05
     fingers.down((x - 40, y))
     fingers.drag(((x - 40, y), (x - 120, y)), ((x + 40, y), (x + 120, y)))
-    expect(page.locator(".pane.active .pane-where")).to_contain_text(re.compile(r"3\.\d\u00d7"))
+    expect(page.locator(".pane.active .pane-where")).to_contain_text(f"{enlarged}\u00d7")
     assert desk.session()["revision"] == 1, "two fingers measure nothing"
 
 

@@ -71,6 +71,21 @@ def test_who_may_only_watch_has_no_tools(
     assert not (service.catalogue.directory / "jump-2.digitized").exists()
 
 
+def test_a_phone_has_pictures_and_slider_on_one_screen(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=360, height=780, has_touch=True, is_mobile=True)
+    for width, height, scrolled in ((360, 780, 0), (780, 360, "document.querySelector('.view-tools').offsetTop")):
+        page.set_viewport_size({"width": width, "height": height})
+        page.evaluate(f"scrollTo(0, {scrolled})")
+        for part in ('.pane[data-camera="K1"] canvas', '.pane[data-camera="K3"] canvas', "#pulse-slider"):
+            box = page.locator(part).bounding_box()
+            assert box is not None
+            assert box["y"] >= 0, (width, part)
+            assert box["y"] + box["height"] <= height, (width, part)
+        slider = page.locator("#pulse-slider").bounding_box()
+        assert slider is not None
+        assert slider["width"] > 300
+
+
 @pytest.mark.parametrize(
     ("look", "width", "locale"),
     [

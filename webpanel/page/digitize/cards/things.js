@@ -2,6 +2,7 @@
 
 import { t } from "../../i18n/i18n.js";
 import { $, make, setText } from "../../shared/dom.js";
+import { number } from "../../shared/format.js";
 import { BY_HAND, remove, select, setSigma, setState, target, toggleGuess } from "../marking/marking.js";
 import { said } from "../session/advance.js";
 import { cameras, change, listed, state, thingOf, watch } from "../session/state.js";
@@ -90,6 +91,6 @@ function drawMark() {
   $("sigma").disabled = !mark;
   if (document.activeElement !== $("sigma")) $("sigma").value = mark ? String(Math.round(1000 * (mark.sigma?.[0] ?? BY_HAND)) / 1000) : "";
   setText($("mark-words"), mark?.xy
-    ? t("digitize.mark_at", { thing: titleOf(mark.thing), camera: mark.camera, x: mark.xy[0].toFixed(2), y: mark.xy[1].toFixed(2) })
+    ? t("digitize.mark_at", { thing: titleOf(mark.thing), camera: mark.camera, x: number(mark.xy[0], 2), y: number(mark.xy[1], 2) })
     : t("digitize.mark_none", { thing: titleOf(state.thing), camera: state.camera }));
 }

@@ -10,6 +10,7 @@
 
 import { t } from "../../i18n/i18n.js";
 import { make, setText } from "../../shared/dom.js";
+import { number } from "../../shared/format.js";
 import { follow, unfollow } from "../marking/geometry.js";
 import { move, place, select, stroke } from "../marking/marking.js";
 import { holdTape } from "../marking/tape.js";
@@ -129,7 +130,7 @@ export function makePane({ name, size }, look) {
     fateWords.hidden = !gone && there;
     element.dataset.fate = fate(name);
     setText(fateWords, gone ? `${words}: ${t(`${FATES[fate(name)]}.means`)}` : there ? "" : t("digitize.loading"));
-    setText(where, gone ? `${state.pulse} · ${words}` : `${state.pulse} · ${scale < 10 ? scale.toFixed(1) : scale.toFixed(0)}×`);
+    setText(where, gone ? `${state.pulse} · ${words}` : `${state.pulse} · ${number(scale, scale < 10 ? 1 : 0)}×`);
     const told = Object.keys(state.view?.marks[name] ?? {}).flatMap((thing) => {
       const how = said(state.view, name, thing)?.state;
       return how === "hidden" || how === "not visible" ? [`${thing.replace(/^\w+:/, "")} ${t(how === "hidden" ? "digitize.hidden" : "digitize.not_visible")}`] : [];

@@ -2,6 +2,7 @@
 
 import { t } from "../../i18n/i18n.js";
 import { $, setText } from "../../shared/dom.js";
+import { number } from "../../shared/format.js";
 import { follow } from "../marking/geometry.js";
 import { place } from "../marking/marking.js";
 import { holdTape } from "../marking/tape.js";
@@ -45,7 +46,7 @@ function draw() {
   $("loupe").value = String(state.loupe);
   for (const { pane } of panes.values()) pane.draw();
   setText($("cursor-where"), state.hover ? t("digitize.where", {
-    camera: state.hover.camera, x: state.hover.xy[0].toFixed(2), y: state.hover.xy[1].toFixed(2),
+    camera: state.hover.camera, x: number(state.hover.xy[0], 2), y: number(state.hover.xy[1], 2),
   }) : "");
 }
 

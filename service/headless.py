@@ -39,8 +39,8 @@ from rig.transport.recorder_commands import RecorderOptions, StartRecording
 from rig.transport.recorder_reports import RecordingFinished
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
-from service.processes.rig_processes import CameraPresence
 from service.processes.rig_session import StartHill
+from service.processes.seen import CameraPresence
 from service.recordings.in_progress import Outcome
 from service.recordings.storage import check_room_for
 from service.status.event_hub import EventHub

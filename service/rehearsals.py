@@ -31,7 +31,7 @@ _PROGRAM_ENDS_S: Final = 5.0
 
 
 class Rehearse(Message):
-    """What the program is told.
+    """The order to the program.
 
     Attributes:
         rig: the rig.
@@ -59,7 +59,7 @@ class NoVerdict(Message):
 
 
 class Rehearsed(Message):
-    """What it showed; fields as `svev.rehearsal.Rehearsed` has them, `spread_us` the median."""
+    """The result; fields as in `svev.rehearsal.Rehearsed`, `spread_us` the median."""
 
     verdict: str
     pulses: int

@@ -46,7 +46,7 @@ class BallPlaces:
 
 
 def _state(file: Path) -> tuple[int, int] | None:
-    """What is another one after a file was written; None: it is not there."""
+    """A stamp of a file that changes when the file is written; None: there is no file."""
     try:
         found = file.stat()
     except OSError:

@@ -88,7 +88,7 @@ def keep(scene: OrientedScene, recording: str, time: UtcNs, rig: RigSettings, fo
 
 
 def kept_in(folder: Path) -> Mapping[str, KeptCamera]:
-    """What is kept, by camera; nothing if there is no such file, or one that cannot be read: the next one is whole."""
+    """The kept orientation, by camera; empty if the file is missing or cannot be read: the next one will be whole."""
     try:
         return _Kept.model_validate_json(read_whole(folder / ORIENTATION, TEXT_MAX, links=False)).cameras
     except (OSError, ValidationError):

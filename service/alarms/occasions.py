@@ -18,7 +18,7 @@ _FEW_JUMPS: Final = (20, 1)
 
 
 class Notification(Model):
-    """What is sent to the webhook, as JSON.
+    """A notification for the webhook, sent as JSON.
 
     Attributes:
         event: what it is about; "test" comes from `svev doctor --send-test`.
@@ -61,7 +61,7 @@ class Occasions:
         self._ended: str | None = None
 
     def look(self, status: Status, now: float) -> list[tuple[Notification, str]]:
-        """Compare a status with what was told until now.
+        """Compare a status with the notifications until now.
 
         Args:
             status: present status.
@@ -83,7 +83,7 @@ class Occasions:
         return told
 
     def _fault(self, status: Status, now: float) -> Iterator[Notification]:
-        """The fault, or its end; nobody needs to be told that it was disarmed."""
+        """The fault, or its end. Disarming needs no notification."""
         said = status.statement
         if status.state in {State.IDLE, State.DISARMING}:
             self._told.pop("fault", None)
@@ -93,7 +93,7 @@ class Occasions:
             yield _notification(status, "fault", f"the fault is over: {said.text}", over=True)
 
     def _cameras(self, status: Status, now: float) -> Iterator[Notification]:
-        """Cameras that are gone or back; of one that is being connected nothing is known."""
+        """Cameras that are gone or back. While a camera is being connected, its presence is not known."""
         for camera in status.cameras:
             topic, said = f"camera {camera.name}", camera.statement
             if camera.state is CameraState.OFF:
@@ -104,7 +104,7 @@ class Occasions:
                 yield _notification(status, "cameras", f"{camera.name} is back", over=True)
 
     def _alarms(self, status: Status, now: float) -> Iterator[Notification]:
-        """What is wrong with pulses, clocks and cameras, or its end; nobody needs to be told that it was disarmed."""
+        """Alarms of pulses, clocks and cameras, and their ends. Disarming needs no notification."""
         if status.state in {State.IDLE, State.DISARMING}:
             for key in self._alarms_told:
                 self._told.pop(key, None)
@@ -130,7 +130,7 @@ class Occasions:
             yield _notification(status, "disk", text, advice)
 
     def _changed(self, topic: str, bad: bool, now: float) -> bool:
-        """Note how something is; whether it is otherwise than was told, and time enough has passed since."""
+        """Note a state; whether it differs from the last notification, and enough time has passed since."""
         told, at = self._told.get(topic, (False, -_TOLD_AGAIN_S))
         if bad is told or now < at + _TOLD_AGAIN_S:
             return False
@@ -147,7 +147,7 @@ def _notification(status: Status, event: Occasion, text: str, advice: str = "", 
 
 
 def with_verdict(notification: Notification, recording: Recording) -> Notification:
-    """The notification that a recording ended, with what it is good for."""
+    """The notification that a recording ended, with its verdict."""
     said = recording.verdict
     session = recording.session
     who = " ".join(text for text in (session.bib, session.athlete) if text)

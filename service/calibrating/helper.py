@@ -8,8 +8,9 @@ while; the pictures stay.
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from rig.api.calibrating import CalibratedLens, Calibrating, CalibratingOrder, CalibratingState, SeenTarget
 from rig.api.statement import Statement
@@ -54,6 +55,60 @@ _IN_USE: Final = phrase(
 )
 
 
+@dataclass(frozen=True, slots=True)
+class _Situation:
+    """What the helper does and has.
+
+    Attributes:
+        state: what it does; while it is `held`, it waits for the end of a recording.
+        held: whether its program stands still.
+        pictures: the set that is worked on; None: there is none yet.
+        seen: what the last pictures show.
+        problem: why nothing is found or computed.
+        lenses: the calibration, once it is computed.
+        saved: whether the rig file names it.
+    """
+
+    pictures: PictureSet | None
+    state: CalibratingState = CalibratingState.OFF
+    held: bool = False
+    seen: Looked = field(default_factory=Looked)
+    problem: Statement | None = None
+    lenses: tuple[CalibratedLens, ...] = ()
+    saved: bool = False
+
+    @property
+    def works(self) -> bool:
+        """Whether a program runs."""
+        return self.state in {CalibratingState.LOOKING, CalibratingState.COMPUTING}
+
+    def view(self) -> Calibrating:
+        """As the REST API tells it; the kept pictures on the disk are what counts."""
+        taken = [] if self.pictures is None else numbers(self.pictures.pictures)
+        return Calibrating(
+            state=CalibratingState.HELD if self.works and self.held else self.state,
+            still=self.state is CalibratingState.LOOKING and self.seen.still,
+            full=len(taken) >= MOST_PICTURES,
+            folder=None if self.pictures is None else str(self.pictures.pictures),
+            taken=len(taken),
+            cameras=() if self.pictures is None else self._targets(self.pictures.regions),
+            problem=self.problem,
+            lenses=self.lenses,
+            saved=self.saved,
+        )
+
+    def _targets(self, regions: Mapping[str, Region]) -> tuple[SeenTarget, ...]:
+        """What the cameras have seen; corners count while the helper is looking."""
+        seen = self.seen.cameras or {}
+        nothing = {} if self.state is CalibratingState.LOOKING else {"corners": ()}
+        return tuple(
+            seen[name].model_copy(update=nothing)
+            if name in seen
+            else SeenTarget(camera=name, width=region.width, height=region.height)
+            for name, region in regions.items()
+        )
+
+
 class CalibrationHelper:
     """Any thread may call any method.
 
@@ -75,33 +130,15 @@ class CalibrationHelper:
     ) -> None:
         self._directory, self._rig, self._live, self._busy, self._keep = directory, rig, live, busy, keep
         self._lock, self._commands = threading.Lock(), threading.RLock()
-        self._state, self._held = CalibratingState.OFF, False
-        self._set = last_set(directory, rig().calibration)
-        self._seen = Looked()
-        self._problem: Statement | None = None
-        self._lenses: tuple[CalibratedLens, ...] = ()
-        self._saved = False
+        self._now = _Situation(last_set(directory, rig().calibration))
         self._worker: threading.Thread | None = None
         self._unwanted = threading.Event()
         self._looked = 0.0
 
     def view(self) -> Calibrating:
         """What the helper does and has; who asks keeps it going."""
-        with self._lock:
-            self._looked = time.monotonic()
-            working = self._state in {CalibratingState.LOOKING, CalibratingState.COMPUTING}
-            taken = [] if self._set is None else numbers(self._set.pictures)
-            return Calibrating(
-                state=CalibratingState.HELD if working and self._held else self._state,
-                still=self._state is CalibratingState.LOOKING and self._seen.still,
-                full=len(taken) >= MOST_PICTURES,
-                folder=None if self._set is None else str(self._set.pictures),
-                taken=len(taken),
-                cameras=() if self._set is None else self._targets(self._set.regions),
-                problem=self._problem,
-                lenses=self._lenses,
-                saved=self._saved,
-            )
+        self._looked = time.monotonic()
+        return self._now.view()
 
     def begin(self, order: CalibratingOrder) -> Calibrating:
         """Look at live pictures and keep those that are wanted; pictures that are there go on, unless `anew`.
@@ -110,19 +147,18 @@ class CalibrationHelper:
             StorageError: no folder can be made for them.
         """
         with self._commands:
-            regions, known = self._regions(), self._set
+            regions, known = self._regions(), self._now.pictures
             printed = order.model_copy(update={"anew": False})
             if known is not None and (known.order, known.regions) == (printed, regions):
-                if self._state is CalibratingState.LOOKING and not order.anew:
+                if self._now.state is CalibratingState.LOOKING and not order.anew:
                     return self.view()
             else:
                 known = None
             self._end()
-            with self._lock:
-                if known is None or order.anew or self._saved:
-                    known, self._seen = new_set(self._directory, printed, regions), Looked()
-                self._set, self._problem, self._lenses, self._saved = known, None, (), False
-            self._start(CalibratingState.LOOKING, self._find)
+            if known is None or order.anew or self._now.saved:
+                known = new_set(self._directory, printed, regions)
+                self._change(seen=Looked())
+            self._start(CalibratingState.LOOKING, self._find, known)
             return self.view()
 
     def end(self) -> Calibrating:
@@ -139,11 +175,11 @@ class CalibrationHelper:
             StorageError: the disk refuses.
         """
         with self._commands:
-            if self._state is CalibratingState.COMPUTING:
+            if self._now.state is CalibratingState.COMPUTING:
                 raise StateForbidsError(_COMPUTING)
             self._check_unsaved()
             try:
-                if self._set is None or not remove_last(self._set.pictures):
+                if self._now.pictures is None or not remove_last(self._now.pictures.pictures):
                     raise StateForbidsError(_NO_PICTURE)
             except OSError as error:
                 raise StorageError(
@@ -153,9 +189,8 @@ class CalibrationHelper:
                         why=str(error.strerror),
                     )
                 ) from error
-            with self._lock:
-                if self._state in {CalibratingState.DONE, CalibratingState.FAILED}:
-                    self._state, self._problem, self._lenses = CalibratingState.OFF, None, ()
+            if self._now.state in {CalibratingState.DONE, CalibratingState.FAILED}:
+                self._change(state=CalibratingState.OFF, problem=None, lenses=())
             return self.view()
 
     def compute(self) -> Calibrating:
@@ -165,15 +200,14 @@ class CalibrationHelper:
             StateForbidsError: there are no pictures, or the calibration by them is in use.
         """
         with self._commands:
-            if self._state is CalibratingState.COMPUTING:
+            if self._now.state is CalibratingState.COMPUTING:
                 return self.view()
             self._check_unsaved()
-            if self._set is None or not numbers(self._set.pictures):
+            pictures = self._now.pictures
+            if pictures is None or not numbers(pictures.pictures):
                 raise StateForbidsError(_NO_PICTURES)
             self._end()
-            with self._lock:
-                self._problem, self._lenses, self._saved = None, (), False
-            self._start(CalibratingState.COMPUTING, self._compute)
+            self._start(CalibratingState.COMPUTING, self._compute, pictures)
             return self.view()
 
     def save(self) -> Calibrating:
@@ -185,10 +219,11 @@ class CalibrationHelper:
             StorageError: the rig file cannot be written.
         """
         with self._commands:
-            if self._state is not CalibratingState.DONE or self._set is None:
+            pictures = self._now.pictures
+            if self._now.state is not CalibratingState.DONE or pictures is None:
                 raise StateForbidsError(_NO_CALIBRATION)
-            now = self._regions()
-            changed = [name for name, region in self._set.regions.items() if now.get(name) != region]
+            regions = self._regions()
+            changed = [name for name, region in pictures.regions.items() if regions.get(name) != region]
             if changed:
                 raise StateForbidsError(
                     phrase(
@@ -198,9 +233,8 @@ class CalibrationHelper:
                         cameras=", ".join(changed),
                     )
                 )
-            self._keep(self._set.folder / RESULT)
-            with self._lock:
-                self._saved = True
+            self._keep(pictures.folder / RESULT)
+            self._change(saved=True)
             return self.view()
 
     def protocol(self) -> Path:
@@ -209,9 +243,10 @@ class CalibrationHelper:
         Raises:
             StateForbidsError: none is computed.
         """
-        if self._state is not CalibratingState.DONE or self._set is None:
+        now = self._now
+        if now.state is not CalibratingState.DONE or now.pictures is None:
             raise StateForbidsError(_NO_PROTOCOL)
-        return self._set.folder / "protocol.html"
+        return now.pictures.folder / "protocol.html"
 
     def close(self) -> None:
         """End what runs."""
@@ -223,27 +258,18 @@ class CalibrationHelper:
 
     def _check_unsaved(self) -> None:
         """Check that the rig file does not name what is computed from these pictures."""
-        if self._saved:
+        if self._now.saved:
             raise StateForbidsError(_IN_USE)
 
-    def _targets(self, regions: Mapping[str, Region]) -> tuple[SeenTarget, ...]:
-        """What the cameras have seen; corners count while the helper is looking."""
-        seen = self._seen.cameras or {}
-        nothing = {} if self._state is CalibratingState.LOOKING else {"corners": ()}
-        return tuple(
-            seen[name].model_copy(update=nothing)
-            if name in seen
-            else SeenTarget(camera=name, width=region.width, height=region.height)
-            for name, region in regions.items()
-        )
-
-    def _start(self, state: CalibratingState, work: Callable[[PictureSet], None]) -> None:
-        if self._set is None:
-            raise TypeError("there is no set of pictures")
-        self._unwanted.clear()
+    def _change(self, **what: Any) -> None:
         with self._lock:
-            self._state, self._held, self._looked = state, False, time.monotonic()
-        self._worker = threading.Thread(target=work, args=(self._set,), name="calibrating", daemon=True)
+            self._now = replace(self._now, **what)
+
+    def _start(self, state: CalibratingState, work: Callable[[PictureSet], None], pictures: PictureSet) -> None:
+        self._unwanted.clear()
+        self._looked = time.monotonic()
+        self._change(pictures=pictures, state=state, held=False, problem=None, lenses=(), saved=False)
+        self._worker = threading.Thread(target=work, args=(pictures,), name="calibrating", daemon=True)
         self._worker.start()
 
     def _end(self) -> None:
@@ -251,9 +277,8 @@ class CalibrationHelper:
         if self._worker is not None:
             self._worker.join(_PROGRAM_ENDS_S)
             self._worker = None
-        with self._lock:
-            if self._state in {CalibratingState.LOOKING, CalibratingState.COMPUTING}:
-                self._state = CalibratingState.OFF
+        if self._now.works:
+            self._change(state=CalibratingState.OFF)
 
     def _find(self, pictures: PictureSet) -> None:
         def wanted() -> bool:
@@ -268,26 +293,19 @@ class CalibrationHelper:
         order = Compute(folder=pictures.folder, printed=pictures.order)
         end = self._run(order, lambda: not self._unwanted.is_set())
         if isinstance(end, Computed):
-            with self._lock:
-                self._lenses = end.lenses
+            self._change(lenses=end.lenses)
         done = CalibratingState.FAILED if isinstance(end, Failed) else CalibratingState.DONE
         self._conclude(CalibratingState.OFF if end is None else done, CalibratingState.COMPUTING, end)
 
     def _run(self, order: Order, wanted: Callable[[], bool], *, yielding: bool = True) -> End | None:
         def tell(news: Looked) -> None:
-            with self._lock:
-                self._problem = news.problem
-                if news.cameras is not None:
-                    self._seen = news
-
-        def hold(held: bool) -> None:
-            with self._lock:
-                self._held = held
+            self._change(problem=news.problem, **({} if news.cameras is None else {"seen": news}))
 
         try:
             return run_child(
                 _PROGRAM, order, Looked | Computed,
-                busy=self._busy, wanted=wanted, tell=tell, hold=hold, yielding=yielding, inherited=(self._live,),
+                busy=self._busy, wanted=wanted, tell=tell, hold=lambda held: self._change(held=held), yielding=yielding,
+                inherited=(self._live,),
             )  # fmt: skip
         except OSError as error:
             why = error.strerror or str(error)
@@ -296,6 +314,6 @@ class CalibrationHelper:
 
     def _conclude(self, now: CalibratingState, before: CalibratingState, end: End | None) -> None:
         with self._lock:
-            if self._state is before:
-                self._state = now
-                self._problem = as_error(end.said) if isinstance(end, Failed) else None
+            if self._now.state is before:
+                problem = as_error(end.said) if isinstance(end, Failed) else None
+                self._now = replace(self._now, state=now, problem=problem)

@@ -1,4 +1,4 @@
-"""What the programs of the calibration helper are told, and what they say."""
+"""Orders to the programs of the calibration helper, and their answers."""
 
 from collections.abc import Mapping
 from pathlib import Path

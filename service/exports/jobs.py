@@ -134,7 +134,7 @@ class Exports:
         return self._place(job)
 
     def remove(self, job_id: str) -> ExportJob:
-        """Remove an export and its file; if it is not done yet, it is given up.
+        """Remove an export and its file; an unfinished one is cancelled.
 
         Raises:
             UnknownExportError: there is none of this id.

@@ -24,7 +24,7 @@ UNDO_NAME: Final = ".svev-start-list-undo.json"
 
 
 class Change(Model):
-    """A change that can be undone: what it was, and the list before it."""
+    """A change that can be undone: its description, and the list before it."""
 
     said: Statement
     before: StartList

@@ -55,7 +55,7 @@ def _choices(readings: Sequence[Reading]) -> tuple[ReadingChoice, ...]:
 
 
 def _texts(table: Table | None) -> list[str]:
-    """All texts of a table, in an order that is that of its file."""
+    """All texts of a table, in the order of its file."""
     if table is None:
         return []
     return [*table.named, *(text for line in table.lines for text in _texts_of(line))]

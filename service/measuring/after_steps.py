@@ -66,7 +66,7 @@ class AfterSteps:
         shutil.rmtree(self._folder / _WORKSHOP, ignore_errors=True)
 
     def measure(self, recording: str, log: Path, analysis: AnalysisSettings) -> None:
-        """Measure a log, with a video if the rig file asks for one; what failed is noted and told.
+        """Measure a log, with a video if the rig file asks for one; a failure is noted, and an event tells of it.
 
         Args:
             recording: its id.
@@ -117,7 +117,7 @@ class AfterSteps:
             shutil.rmtree(made, ignore_errors=True)
 
     def rename(self, recording: str, log: Path) -> bool:
-        """Write those files of a result anew that say whose jump it is; what failed is told.
+        """Write those files of a result anew that name the jumper; an event tells of a failure.
 
         Returns:
             Whether that is done.
@@ -144,7 +144,7 @@ class AfterSteps:
         return True
 
     def copy(self, recording: str, log: Path, to: Path) -> None:
-        """Copy a log, measured or not, with all that belongs to it; what failed is noted and told."""
+        """Copy a log, measured or not, with its files; a failure is noted, and an event tells of it."""
         self._hear(Progress(step=MeasuringStep.COPYING, share=0.0))
         mark, why = mark_of(log), None
         order = Copy(paths=(log, *beside(log)), to=to)

@@ -113,7 +113,7 @@ class Measurings:
         self._bell.set()
 
     def renamed(self, recording: str, log: Path) -> None:
-        """The session of a recording was corrected: its result gets what it says of that written anew."""
+        """The session of a recording was corrected: the files of its result that name the jumper are written anew."""
         if log.parent == self._folder and is_outdated(log):
             with suppress(StateForbidsError):  # two thousand wait: a service that starts again finds it
                 self._names.add(recording)
@@ -145,7 +145,7 @@ class Measurings:
         return self.measurement(recording, log)
 
     def measurement(self, recording: str, log: Path) -> Measurement:
-        """What is known of the jumps of a log that lies in the folder, and how far its measuring is."""
+        """The measured jumps of a log in the folder, and the progress of its measuring."""
         ids, running = self._waiting.ids, self._running
         known = measurement_of(recording, log)  # what left the queue before is there
         if self._in_use().analysis is None:
@@ -247,7 +247,7 @@ class Measurings:
         return None
 
     def _work(self, recording: str) -> None:
-        """Measure a log, and take the further steps; what is given up meanwhile, or was interrupted, is not noted."""
+        """Measure a log, and take the further steps; a step that was cancelled or interrupted leaves no note."""
         log, analysis = self._log(recording), self._in_use().analysis
         with self._at_work(recording, self._waiting):
             if analysis is not None:  # else another rig file, since it was queued
@@ -319,7 +319,7 @@ class Measurings:
         self._changed()
 
     def _hear(self, news: Progress) -> None:
-        """Enter how far the program is; in steps that somebody would see, since everybody is told of each."""
+        """Enter the progress of the program, in visible steps only, since every page hears of each."""
         known = self.view
         if news.step is not known.step or news.share >= known.share + _SEEN_SHARE:
             self._change(step=news.step, share=news.share)

@@ -17,7 +17,7 @@ _UNREADABLE: Final = ""
 
 
 class Retries:
-    """Once per change of the file: a log that fails again, or is given up meanwhile, waits for the next change.
+    """Once per change of the file: a log that fails again, or is cancelled meanwhile, waits for the next change.
 
     Args:
         folder: of the recordings.

@@ -67,7 +67,7 @@ class WaitingLogs:
                 self._ids.remove(recording)
 
     def load(self) -> None:
-        """Go on with those of an earlier service, behind those that have come since."""
+        """Append the logs that waited in an earlier service."""
         try:
             before = _IDS.validate_json(read_whole(self._file, TEXT_MAX, links=False))
         except FileNotFoundError:

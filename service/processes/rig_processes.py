@@ -11,7 +11,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import replace
 from types import TracebackType
 from typing import Final, Self
 
@@ -19,8 +19,7 @@ from rig.clocks import HostNs, host_now
 from rig.doctor_call import doctor_call
 from rig.errors import ProcessDiedError
 from rig.events import Event, Level
-from rig.health import Health
-from rig.phrase import NOTHING, Phrase, phrase
+from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ActionTrigger, GpioTrigger, IidcBroadcastTrigger, TriggerBoxTrigger
 from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Measuring
@@ -39,12 +38,9 @@ from rig.transport.recorder_commands import (
 )
 from rig.transport.recorder_reports import (
     CameraChanged,
-    CameraNews,
     RecorderEvent,
     RecorderHealth,
-    RecorderReady,
     RecorderReport,
-    RecorderWarm,
 )
 from rig.transport.ring import CameraRing
 from rig.transport.trigger_messages import (
@@ -57,9 +53,8 @@ from rig.transport.trigger_messages import (
 )
 from service.processes.backends import check_backends
 from service.processes.memory import ring_slots
+from service.processes.seen import Processes, Seen
 from service.processes.simulation import TRIGGER_PORT
-from triggering.timeline.pulse_train import RHYTHM, RHYTHM_LEAST
-from triggering.timeline.steady_rate import SteadyRate, rhythm
 
 RECORDER: Final = "recorder"
 ANALYSIS: Final = "analysis"
@@ -72,31 +67,6 @@ RigReport = RecorderReport | JumpMeasured | Measuring
 _FORWARDED: Final = TellResult | AnalysisTold | TellActions | TellPulses | PulsesFired | TriggerTold
 
 
-@dataclass(frozen=True, slots=True)
-class CameraPresence:
-    """The recorder's last news of a camera.
-
-    Attributes:
-        news: what happened to the camera; None: no news yet.
-        said: description of the camera, or why it is not there.
-        counted: for a silent camera: number of health records in a row in which it delivered frames again.
-    """
-
-    news: CameraNews | None = None
-    said: Phrase = NOTHING
-    counted: int = 0
-
-    @property
-    def present(self) -> bool:
-        """Whether the camera is connected; a silent one is, until its grabber gives it up."""
-        return self.news in {CameraNews.CONNECTED, CameraNews.SILENT}
-
-    @property
-    def tried(self) -> bool:
-        """Whether the camera has answered, or the grabber has failed to connect it."""
-        return self.news is not None
-
-
 class RigProcesses:
     """All processes of one rig; a context manager that stops them whatever happens.
 
@@ -106,15 +76,6 @@ class RigProcesses:
         epoch: host time of pulse 0 of the simulated hill, the replayed log or the commands; now if left out.
         recorder: what the recorder does beside recording.
         environment: what simulated devices are found by: variables for who uses FireWire cameras, `TRIGGER_PORT`.
-
-    Attributes:
-        cameras: presence of each camera.
-        warm: whether complete triplets have come.
-        ready: whether the recorder has started.
-        recorder_died: whether the recorder is dead; the presence of cameras is not known then.
-        health: the recorder's last health record.
-        rate: of the pulses, as measured last; None: not known.
-        still: whether pulses are made on request only.
 
     Raises:
         BadInputError: libdc1394 is missing, or a log that is to be replayed does not fit.
@@ -144,11 +105,7 @@ class RigProcesses:
         self._back_offs = {name: BackOff() for name in self._helpers}
         self._again: dict[Child, float] = {}
         self._renewed: set[str] = set()
-        self.cameras = [CameraPresence()] * len(rig.cameras)
-        self.warm = self.ready = self.recorder_died = False
-        self.health: Health | None = None
-        self.rate: SteadyRate | None = None
-        self.still = False
+        self._seen = Seen.begun(len(rig.cameras))
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -176,14 +133,15 @@ class RigProcesses:
         return {name: self._processes[name].pid for name in (*self._helpers, RECORDER)}
 
     @property
-    def restarts(self) -> dict[str, int]:
-        """How many times each grabber, by camera, the analysis and the process that makes pulses died."""
-        return {name: back_off.deaths for name, back_off in self._back_offs.items()}
+    def seen(self) -> Seen:
+        """All that is known of the processes now."""
+        restarts = {name: back_off.deaths for name, back_off in self._back_offs.items()}
+        started = self._processes[RECORDER].started
+        return replace(self._seen, started=started, pids=self.pids, restarts=restarts)
 
     @property
-    def started(self) -> float:
-        """When the recorder was started, on the monotonic clock, s."""
-        return self._processes[RECORDER].started
+    def _recorder_died(self) -> bool:
+        return self._seen.processes is Processes.NO_RECORDER
 
     def tell(self, command: RecorderCommand) -> None:
         """Send a command to the recorder, without waiting for it to read."""
@@ -212,7 +170,7 @@ class RigProcesses:
 
     def let_pulses(self, pulses: int | None) -> None:
         """Have the process that makes the pulses make so many from now on; None: without end."""
-        self.still = pulses is not None
+        self._seen = replace(self._seen, still=pulses is not None)
         self._processes[TRIGGER].control.send(LetPulses(pulses=pulses))
 
     def turn(self, timeout_s: float, wake: tuple[int, ...] = ()) -> list[RigReport]:
@@ -232,60 +190,32 @@ class RigProcesses:
         """
         reports = [message for _, message in self._processes.receive(timeout_s, wake)]
         for report in reports:
+            self._seen = self._seen.heard(report)
             match report:
                 case TellResult() | TellActions() | TellPulses() | PulsesFired():
-                    if not self.recorder_died:
+                    if not self._recorder_died:
                         self.tell(report)
-                case AnalysisTold() | TriggerTold():
+                case AnalysisTold() | TriggerTold() | RecorderEvent():
                     self._on_event(report.event)
                 case CameraChanged():
-                    self._note_camera(report)
-                case RecorderWarm():
-                    self.warm = True
-                    self.rate = self.rate if report.rate_hz is None else SteadyRate(report.rate_hz, report.rate_error)
-                case RecorderReady():
-                    self.ready = True
-                case RecorderEvent():
-                    self._on_event(report.event)
-                case RecorderHealth():
-                    self._note_health(report.health)
+                    self._on_event(report.event(self._names[report.camera]))
+                case RecorderHealth() if isinstance(self._rig.trigger, ActionTrigger):
+                    self._processes[TRIGGER].control.send(CamerasSeen.of(report.health))
         self._tend()
         return [report for report in reports if not isinstance(report, _FORWARDED)]
 
     def restart_recorder(self) -> None:
         """Start a recorder in place of the dead one; it takes over cameras that are still streaming at once."""
-        self.recorder_died = False
+        self._seen = replace(self._seen, processes=Processes.ALL)
         self._start_recorder()
-
-    def _note_camera(self, change: CameraChanged) -> None:
-        if change.news is not CameraNews.NOTICE:
-            self.cameras[change.camera] = CameraPresence(change.news, change.said)
-        self._on_event(change.event(self._names[change.camera]))
-
-    def _note_health(self, health: Health) -> None:
-        self.health = health
-        self.rate = rhythm(health.pairing, RHYTHM_LEAST, RHYTHM) or self.rate
-        self._note_recovered(health)
-        if isinstance(self._rig.trigger, ActionTrigger):
-            self._processes[TRIGGER].control.send(CamerasSeen.of(health))
-
-    def _note_recovered(self, health: Health) -> None:
-        """Note which silent cameras deliver again, by the frames in their health records: no report says so."""
-        for index, camera in enumerate(self.cameras):
-            if camera.news is CameraNews.SILENT:
-                counted = camera.counted + 1 if health.cameras[index].frames_per_s else 0
-                news = CameraNews.CONNECTED if counted > 1 else CameraNews.SILENT
-                self.cameras[index] = CameraPresence(news, camera.said, counted)
 
     def _tend(self) -> None:
         """Start dead grabbers again, after a wait that grows; raise if the recorder died."""
         for child in self._processes.dead():
             if child.spec.name != RECORDER:
                 self._tend_helper(child)
-            elif child.control.ended and not self.recorder_died:
-                self.recorder_died, self.ready, self.warm, self.health = True, False, False, None
-                self.rate = None
-                self.cameras = [CameraPresence()] * len(self._names)
+            elif child.control.ended and not self._recorder_died:
+                self._seen = self._seen.without_recorder()
                 text = "the recorder process ended ({how}): if it recurs, run {doctor}"
                 how = child.ending() or ""
                 raise ProcessDiedError(phrase("why_recorder_ended", text, how=how, doctor=doctor_call()))
@@ -336,14 +266,14 @@ class RigProcesses:
         trigger = self._rig.trigger
         if isinstance(trigger, TriggerBoxTrigger):
             config = TriggerBoxConfig(
-                rig=self._rig, port=self._environment.get(TRIGGER_PORT, trigger.port), still=self.still
+                rig=self._rig, port=self._environment.get(TRIGGER_PORT, trigger.port), still=self._seen.still
             )
             box = ProcessSpec(TRIGGER, "service.processes.programs.triggerbox", config, reports=TriggerReport)
             self._processes.start(box)
         else:
             at_times = isinstance(trigger, GpioTrigger | IidcBroadcastTrigger)
             program = "service.processes.programs.even_pulses" if at_times else "service.processes.programs.actions"
-            even = TriggerConfig(rig=self._rig, epoch=self._epoch, still=self.still)
+            even = TriggerConfig(rig=self._rig, epoch=self._epoch, still=self._seen.still)
             # As for grabbers: libdc1394 needs them to see the emulated bus.
             more = self._environment if isinstance(trigger, IidcBroadcastTrigger) else {}
             self._processes.start(ProcessSpec(TRIGGER, program, even, reports=TriggerReport, environment=more))

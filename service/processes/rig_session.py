@@ -6,67 +6,22 @@ The supervisor's loop has to go on while simulated cameras draw their first imag
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack, suppress
-from dataclasses import dataclass, field
-from enum import Enum
 from functools import partial
-from types import MappingProxyType
 
 from rig.clocks import HostNs, host_now
 from rig.errors import ProcessDiedError, SvevError
 from rig.events import Event
-from rig.health import Health
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.transport.recorder_commands import RecorderOptions, TellEvent
 from service.processes.backends import prepare_programs
-from service.processes.rig_processes import CameraPresence, RigProcesses
+from service.processes.rig_processes import RigProcesses
+from service.processes.seen import Seen
 from service.processes.simulation import hill_environment, simulated_truth
 from service.recordings.truth import WriteTruth
-from triggering.timeline.steady_rate import SteadyRate
 
 #: Starts simulated cameras with pulse 0 at a host time; yields the environment variables that grabbers need for them.
 StartHill = Callable[[HostNs], AbstractContextManager[Mapping[str, str]]]
-
-
-class Processes(Enum):
-    """Which processes of the rig run."""
-
-    NONE = "none"
-    ALL = "all"
-    NO_RECORDER = "all but the recorder, which died"
-
-
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """The processes of a rig as they are at one moment.
-
-    Attributes:
-        processes: which of them run; while they are started or stopped, none.
-        busy: whether they are being started or stopped.
-        empty: whether nothing is left to stop.
-        cameras: what was last heard of each camera; None: no processes run.
-        warm: whether complete triplets have come.
-        ready: whether the recorder has started.
-        still: whether pulses are made on request only.
-        started: when the recorder was started, on the monotonic clock, s.
-        health: the recorder's last health record; None: there is none.
-        rate: of the pulses, as measured last; None: not known.
-        pids: process ids by row of the process table.
-        restarts: how often each row was started again.
-    """
-
-    processes: Processes = Processes.NONE
-    busy: bool = False
-    empty: bool = True
-    cameras: tuple[CameraPresence, ...] | None = None
-    warm: bool = False
-    ready: bool = False
-    still: bool = False
-    started: float = 0.0
-    health: Health | None = None
-    rate: SteadyRate | None = None
-    pids: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
-    restarts: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
 
 
 class RigSession:
@@ -109,15 +64,10 @@ class RigSession:
 
     def look(self) -> Seen:
         """What is there now; `busy` until the result of a job is collected."""
+        if self.processes is not None:
+            return self.processes.seen
         busy = self._job is not None
-        if (running := self.processes) is None:
-            return Seen(busy=busy, empty=not busy and self._hill is None)
-        return Seen(
-            Processes.NO_RECORDER if running.recorder_died else Processes.ALL, busy=busy, empty=False,
-            cameras=tuple(running.cameras), warm=running.warm, ready=running.ready, still=running.still,
-            started=running.started, health=running.health, rate=running.rate,
-            pids=running.pids, restarts=running.restarts,
-        )  # fmt: skip
+        return Seen(busy=busy, empty=not busy and self._hill is None)
 
     def tell(self, event: Event) -> None:
         """Pass on an event, also to the recorder, which publishes it and writes it into its log."""

@@ -38,7 +38,7 @@ class ArchiveResults(ABC):
         """The present status, which has the recording in progress."""
 
     def measurement(self, recording_id: str, *, jumps: bool) -> Measurement:
-        """What is known of the jumps of a recording: of the whole log, otherwise what was measured live.
+        """The jumps of a recording: from the whole log if it was measured, otherwise from live measurement.
 
         Args:
             recording_id: its id.

@@ -24,7 +24,7 @@ Outcome = RecordingFinished | SvevError
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What is known of the pulses of a recording.
+    """The account of the pulses of a recording.
 
     Attributes:
         started: time of the first pulse; None: none has come yet.
@@ -131,7 +131,7 @@ class RecordingInProgress:
         return replace(self, logs=(*self.logs, path))
 
     def gone_on(self, order: StartRecording, before: Counts) -> "RecordingInProgress":
-        """A new recorder is told to go on.
+        """A new recorder has the order to go on.
 
         Args:
             order: what it is told.

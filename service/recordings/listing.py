@@ -40,7 +40,7 @@ class Found:
 
 
 def find(entries: Iterable[Entry], query: RecordingQuery, level: Callable[[Entry], Level]) -> Found:
-    """The recordings that fit a query, in its order, and of them those of its page.
+    """The recordings that fit a query, in its order; of these, one page.
 
     Args:
         entries: of the folder or of its trash, newest first.

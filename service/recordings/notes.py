@@ -19,7 +19,7 @@ _FIELDS_MAX: Final = 400
 
 
 def notes_of(session: Mapping[str, str]) -> list[Note]:
-    """The notes of a recording, by pulse; a field without text was one that is removed."""
+    """The notes of a recording, by pulse; a field without text stands for a removed note."""
     found = {
         name.removeprefix(NOTE_FIELD): text for name, text in session.items() if name.startswith(NOTE_FIELD) and text
     }

@@ -124,7 +124,7 @@ class Archive(Protocol):
         ...
 
     def measurement(self, recording_id: str, *, jumps: bool) -> Measurement:
-        """What is known of the jumps of a recording, in full if `jumps`, and how far its measuring is."""
+        """The measured jumps of a recording, with all figures if `jumps`, and the progress of its measuring."""
         ...
 
     def athletes(self) -> list[Athlete]:
@@ -197,9 +197,9 @@ class Exports(Protocol):
         ...
 
     def file(self, job_id: str) -> Path:
-        """The file of one that is done."""
+        """The file of a finished export."""
         ...
 
     def remove(self, job_id: str) -> ExportJob:
-        """Remove one and its file; one that is not done is given up."""
+        """Remove an export and its file; an unfinished one is cancelled."""
         ...

@@ -80,7 +80,7 @@ class RigService(Archive, Cameras, Protocol):
 
     @property
     def exports(self) -> Exports:
-        """What is being exported, and what has been."""
+        """The exports of recordings: those under way, and those that are kept."""
         ...
 
     def start_export(self, recording_id: str, order: ExportOrder) -> ExportJob:

@@ -16,7 +16,7 @@ from rig.phrases import in_turn
 from rig.pulse import Pause
 from rig.settings.camera import CameraSettings
 from rig.transport.recorder_reports import CameraNews
-from service.processes.rig_processes import CameraPresence
+from service.processes.seen import CameraPresence
 
 _CAMERA_ADVICE: Final = "check its power and cable; it is connected again by itself"
 _FASTER: Final = (

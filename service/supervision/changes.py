@@ -10,7 +10,7 @@ from rig.events import TRIGGER, Level
 from rig.phrase import Phrase, phrase
 from rig.settings.light import camera_of
 from rig.settings.region import named
-from service.processes.rig_session import Processes, Seen
+from service.processes.seen import Processes, Seen
 from service.status.forbidden import FORBIDDEN
 from service.supervision.messages import (
     Answer,

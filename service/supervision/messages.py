@@ -1,4 +1,4 @@
-"""What the supervisor is told, and what it does about it: commands, happenings and effects.
+"""The messages to the supervisor, and the effects of its decisions.
 
 A command has somebody who waits for its answer; a happening has not. What the recorder and the analysis report are
 happenings too, as they come. An effect is what a decision does to the world; only `service.supervision.world` has any.
@@ -197,7 +197,7 @@ class LogGrown(msgspec.Struct, frozen=True):
 
 
 class LogRead(msgspec.Struct, frozen=True):
-    """The log of a recorder that died: what it holds, and where the recording goes on; None: it cannot be read."""
+    """The log of a dead recorder: its contents, and where the recording goes on; None: it cannot be read."""
 
     log: Path
     found: FoundLog | None

@@ -20,7 +20,7 @@ from rig.transport.recorder_reports import (
     RecordingProgress,
     RecordingStarted,
 )
-from service.processes.rig_session import Processes
+from service.processes.seen import Processes
 from service.recordings.in_progress import Outcome, RecordingInProgress
 from service.recordings.interruption import (
     DEATHS_MAX,
@@ -150,7 +150,7 @@ def end(
     at_once: bool = False,
     mishap: bool = False,
 ) -> Situation:
-    """Have the recorder close the log, if it was not told so before or is not to wait for the disk now.
+    """Have the recorder close the log; a second time only to stop waiting for the disk.
 
     Args:
         now: the situation.

@@ -20,7 +20,7 @@ from rig.settings.model import RigSettings
 from rig.settings.region import RegionLimits
 from rig.transport.process_table import BackOff
 from rig.transport.recorder_commands import Calibration
-from service.processes.rig_session import Seen
+from service.processes.seen import Seen
 from service.recordings.in_progress import RecordingInProgress
 from service.status.statements import failed
 
@@ -212,7 +212,7 @@ class Recordings:
 
     @property
     def opening(self) -> bool:
-        """Whether a log is being opened: the recording is ordered, and the state is not yet that of recording."""
+        """Whether a log is being opened: the recording is ordered, and the state is not `RECORDING` yet."""
         return self.current is not None and self.current.opening
 
 

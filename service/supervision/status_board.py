@@ -16,7 +16,7 @@ from service.alarms.keeper import AlarmKeeper
 from service.alarms.unrecorded import Unrecorded
 from service.jumpers.book import JumperBook
 from service.processes.rig_processes import ANALYSIS, TRIGGER
-from service.processes.rig_session import Processes
+from service.processes.seen import Processes
 from service.recordings import live_results
 from service.status.event_hub import EventHub
 from service.status.statements import measured, too_slow

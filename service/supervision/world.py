@@ -178,7 +178,7 @@ class World:
         return None
 
     def _prepared(self, effect: PrepareLog) -> Message | None:
-        """The log of a recording; None if there is no room for it, and who ordered it is told so."""
+        """The log of a recording; None if there is no room for it: then the order is refused."""
         rig, folder, order = self.session.rig, self.session.recorder.directory, effect.command.order
         try:
             check_room_for(rig, folder, rig.recorder.jump_s if order.duration_s is None else order.duration_s)

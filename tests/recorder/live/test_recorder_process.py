@@ -129,7 +129,7 @@ def _running(folder: Path, loopback: Loopback, *, preroll_s: float = 4.0) -> Ite
         RigProcesses(rig, lambda _: None, epoch=epoch, recorder=options) as processes,
     ):
         running = Running(rig, processes, preview, folder)
-        running.until("whole triplets come", lambda: processes.warm)
+        running.until("whole triplets come", lambda: processes.seen.warm)
         yield running
     preview.close()
 
@@ -256,7 +256,7 @@ def test_health_says_everything_and_keeps_its_schema(tmp_path: Path, loopback: L
         running.let_pass(60)
         path = running.start("jump", preroll_s=None, pulses=45)
         running.finished(path)
-        health = running.processes.health
+        health = running.processes.seen.health
     with LogReader(path) as reader:
         records = [json.loads(bytes(message.data or b"")) for message in reader.messages("/health")]
     assert len(records) >= 2, "that of the past and of the present"
@@ -318,7 +318,7 @@ def test_a_recorder_started_anew_goes_on_where_the_killed_one_was(tmp_path: Path
             running.until("its death is noticed", lambda: False)
         running.reports.clear()
         running.processes.restart_recorder()
-        running.until("whole triplets come again", lambda: running.processes.warm)
+        running.until("whole triplets come again", lambda: running.processes.seen.warm)
         running.until("all cameras are known again", lambda: running.connected() == {0, 1, 2})
         after = running.start("after", preroll_s=0.0, pulses=60)
         running.finished(after)
@@ -326,7 +326,7 @@ def test_a_recorder_started_anew_goes_on_where_the_killed_one_was(tmp_path: Path
             "slots that the dead one had in hand are free",
             lambda: (health := running.health()) and all(camera.slots_queued <= 2 for camera in health.cameras),
         )
-        assert running.processes.restarts == {"K1": 0, "K2": 0, "K3": 0}
+        assert running.processes.seen.restarts == {"K1": 0, "K2": 0, "K3": 0}
         image = running.preview.read()
         assert image is not None
         assert image.pulse < 1000

@@ -134,7 +134,7 @@ def test_a_recording_loses_nothing_to_hostile_subscribers(
             reports.extend(processes.turn(0.05))
             return any(isinstance(report, kinds) for report in reports)
 
-        wait_until(lambda: turned() or processes.warm, "whole triplets come", WAIT_S, 0.0)
+        wait_until(lambda: turned() or processes.seen.warm, "whole triplets come", WAIT_S, 0.0)
         recorder = processes.pids[RECORDER]
         processes.tell(StartRecording(path=path, session={}, preroll_s=0.0))
         wait_until(lambda: path.exists() and path.stat().st_size > 10 * MB, "it records", WAIT_S)

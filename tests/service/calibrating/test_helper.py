@@ -136,7 +136,7 @@ def test_what_is_in_the_rig_file_is_not_touched_and_other_regions_are_refused(
         assert folder is not None
         _keep(Path(folder), 1, "K1")
         helper.end()
-        helper._state = CalibratingState.DONE  # as after computing, which takes a minute
+        helper._change(state=CalibratingState.DONE)  # as after computing, which takes a minute
         first = SIM.cameras[0].model_copy(update={"region": Region(width=320, height=240)})
         rigs[0] = SIM.model_copy(update={"cameras": (first, *SIM.cameras[1:])})
         with pytest.raises(StateForbidsError, match="the region of K1 was changed"):

@@ -88,7 +88,7 @@ def test_a_stopped_recorder_costs_the_supervisor_no_time_and_no_command(
         def turned(kind: type) -> bool:
             return any(isinstance(report, kind) for report in processes.turn(0.05))
 
-        wait_until(lambda: bool(processes.turn(0.05)) and processes.warm, "whole triplets come", WAIT_S, 0.0)
+        wait_until(lambda: bool(processes.turn(0.05)) and processes.seen.warm, "whole triplets come", WAIT_S, 0.0)
         processes.tell(StartRecording(path=path, session={}, preroll_s=0.0))
         wait_until(lambda: turned(RecordingStarted), "it records", WAIT_S, 0.0)
         recorder = processes.pids[RECORDER]

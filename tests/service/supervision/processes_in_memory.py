@@ -1,5 +1,6 @@
 """A rig whose processes are in memory: it obeys the supervisor's commands and reports what the test lets happen."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -7,18 +8,19 @@ from typing import Any, Self
 from rig.api.recordings import Counts
 from rig.clocks import UtcNs
 from rig.errors import ProcessDiedError, StorageError
-from rig.health import Health
-from rig.phrase import Phrase, phrase
+from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.transport.analysis_messages import Measuring
 from rig.transport.recorder_commands import RecorderCommand, StartRecording, StopRecording
 from rig.transport.recorder_reports import (
+    CameraChanged,
     CameraNews,
     RecorderFailed,
     RecordingFinished,
     RecordingStarted,
 )
-from service.processes.rig_processes import CameraPresence, RigReport
+from service.processes.rig_processes import RigReport
+from service.processes.seen import Seen
 
 
 class ProcessesInMemory:
@@ -35,12 +37,6 @@ class ProcessesInMemory:
     def __init__(self, rig: RigSettings, *_: Any, **__: Any) -> None:
         self._count = len(rig.cameras)
         self._connect()
-        self.recorder_died = self.still = False
-        self.health: Health | None = None
-        self.rate = None
-        self.pids: dict[str, int] = {}
-        self.restarts: dict[str, int] = {}
-        self.started = 0.0
         self.commands: list[RecorderCommand] = []
         self.disk_full = False
         self._reports: list[RigReport] = []
@@ -49,8 +45,9 @@ class ProcessesInMemory:
         type(self).latest = self
 
     def _connect(self) -> None:
-        self.cameras = [CameraPresence(CameraNews.CONNECTED)] * self._count
-        self.warm = self.ready = True
+        self.seen = replace(Seen.begun(self._count), warm=True, ready=True)
+        for index in range(self._count):
+            self.camera(index, CameraNews.CONNECTED)
 
     def __enter__(self) -> Self:
         if self.fails is not None:
@@ -78,7 +75,7 @@ class ProcessesInMemory:
 
     def camera(self, index: int, news: CameraNews) -> None:
         """Let a camera come or go."""
-        self.cameras[index] = CameraPresence(news)
+        self.seen = self.seen.heard(CameraChanged(camera=index, news=news, said=NOTHING))
 
     def die(self) -> None:
         """Let the recorder die."""
@@ -92,15 +89,12 @@ class ProcessesInMemory:
         """What has happened."""
         reports, self._reports = self._reports, []
         if self._dying and not reports:
-            self._dying, self.recorder_died = False, True
-            self.ready = self.warm = False
-            self.cameras = [CameraPresence()] * self._count
+            self._dying, self.seen = False, self.seen.without_recorder()
             raise ProcessDiedError(phrase("why_recorder_died", "the recorder died: killed by SIGKILL"))
         return reports
 
     def restart_recorder(self) -> None:
         """Start another one."""
-        self.recorder_died = False
         self._connect()
 
     def kill_recorder(self) -> None:

@@ -11,8 +11,7 @@ from rig.clocks import HostNs
 from rig.phrase import plain
 from rig.transport.recorder_commands import StartRecording
 from rig.transport.recorder_reports import CameraNews
-from service.processes.rig_processes import CameraPresence
-from service.processes.rig_session import Processes, Seen
+from service.processes.seen import CameraPresence, Processes, Seen
 from service.recordings.in_progress import RecordingInProgress
 from service.status.statements import no_camera
 from service.supervision.decide import decide

@@ -30,8 +30,7 @@ from rig.transport.recorder_reports import (
     RecordingFinished,
     RecordingStarted,
 )
-from service.processes.rig_processes import CameraPresence
-from service.processes.rig_session import Processes, Seen
+from service.processes.seen import CameraPresence, Processes, Seen
 from service.recordings.in_progress import RecordingInProgress
 from service.supervision import messages as m
 from service.supervision.decide import FOLLOWS, FOLLOWS_IN_A_RECORDING, is_over

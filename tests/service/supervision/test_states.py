@@ -93,12 +93,12 @@ class Bench:
 
     def all_cameras_go(self) -> None:
         """All are gone."""
-        for index in range(len(self.rig.cameras)):
+        for index in range(len(SIM.cameras)):
             self.rig.camera(index, CameraNews.GONE)
 
     def all_cameras_come(self) -> None:
         """All are there."""
-        for index in range(len(self.rig.cameras)):
+        for index in range(len(SIM.cameras)):
             self.rig.camera(index, CameraNews.CONNECTED)
 
     def recorder_dies(self) -> None:

@@ -6,7 +6,7 @@ from itertools import product
 import pytest
 
 from rig.api.status import State
-from service.processes.rig_session import Processes, Seen
+from service.processes.seen import Processes, Seen
 from service.supervision.arming import state_by_cameras
 from service.supervision.messages import Effect, RestartRecorder, SetUp, TakeDown, TurnBegins
 from service.supervision.situation import Situation

@@ -6,7 +6,7 @@ from rig.api.recordings import NextJumper
 from rig.api.status import State, Status
 from rig.health import Health
 from rig.settings.model import RigSettings
-from service.processes.rig_session import Seen
+from service.processes.seen import Seen
 from service.supervision.picture import Beside, picture
 from service.supervision.situation import Moment, RigInUse, Situation
 

@@ -10,8 +10,7 @@ from rig.phrase import plain
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ExternalTrigger
 from rig.transport.recorder_reports import CameraNews
-from service.processes.rig_processes import CameraPresence
-from service.processes.rig_session import Processes, Seen
+from service.processes.seen import CameraPresence, Processes, Seen
 from service.supervision.arming import why_not_armed
 from simrig.programs.simulated_hill import SimulatedHill
 from tests.capture.rigs import SCENARIO, make_rig, write_rig

@@ -20,8 +20,7 @@ from service.measuring.results import result_downloads
 from service.recordings.archive_notes import ArchiveNotes
 from service.recordings.archive_results import ArchiveResults
 from service.recordings.describing import Chain, as_pulses, as_recording
-from service.recordings.digitized import digitized_downloads
-from service.recordings.download import download_of, file_name, sha256_of, zipped, zipped_size
+from service.recordings.download import digitized_downloads, download_of, file_name, sha256_of, zipped, zipped_size
 from service.recordings.listing import find
 from service.recordings.measured_jumps import MeasuredJumps
 from service.seam.archive import Download, FoundRecordings

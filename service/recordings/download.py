@@ -1,19 +1,23 @@
 """Recordings as files to take away: with the corrected session, under a name that says who jumped, one or several."""
 
 import hashlib
+import io
 import re
 import unicodedata
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 from recorder.catalogue.entry import Entry
+from recorder.log.digitized_path import digitized_path
 from recorder.log.session_changes import session_changes
 from recorder.reading.corrected_log import corrected_log
 from rig.errors import BadInputError, StateForbidsError
+from rig.host.files import open_to_read
 from rig.phrase import phrase
+from service.measuring.results import file_download
 from service.seam.archive import Download
 
 #: What a part of a file's name may hold on every system; letters are those of any language.
@@ -141,3 +145,23 @@ class _Sink:
 def _part(text: str) -> str:
     """A session field as a part of a file's name."""
     return _NOT_IN_NAMES.sub("-", unicodedata.normalize("NFC", text)).replace("_", "-").strip("-.")[:_PART_MAX]
+
+
+def digitized_downloads(log: Path, name: str) -> list[Download]:
+    """The marks of all operators, and the jumps computed from them, in a folder that belongs beside the log's file.
+
+    Args:
+        log: the log.
+        name: of the file that it is taken away as.
+    """
+    folder = digitized_path(log)
+    within = digitized_path(Path(name)).name
+    files = [path for path in sorted(folder.rglob("*")) if path.is_file() and not path.is_symlink()]
+    seen = [path for path in files if not any(part.startswith(".") for part in path.relative_to(folder).parts)]
+    return [file_download(path, f"{within}/{path.relative_to(folder)}", _begin_of) for path in seen]
+
+
+def _begin_of(path: Path, size: int) -> BinaryIO:
+    """The first bytes of a file: while somebody measures, lines are added to his marks."""
+    with open_to_read(path, links=False) as file:
+        return io.BytesIO(file.read(size))

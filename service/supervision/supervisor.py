@@ -171,10 +171,10 @@ class Supervisor:
     def _turn(self) -> None:
         for command in self._commands.fetch():
             self._obey(command)
-        if self._over():
-            return
         for news in self._world.news():
             self._take(news)
+        if self._over():
+            return
         self._take(TurnBegins())
         self._show()
         for report in self._world.listen(_TURN_S, self._commands.bell):

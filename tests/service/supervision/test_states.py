@@ -37,10 +37,10 @@ class Bench:
         opened: answered when the log of the last recording is open.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, enduring: bool = True) -> None:
         self.moves: list[State] = [IDLE]
-        options = RecorderOptions(directory=folder)
-        self.supervisor = Supervisor(SIM, "", EventHub(lambda _: None), options, hill=lambda _: nullcontext({}))
+        options, hub = RecorderOptions(directory=folder), EventHub(lambda _: None)
+        self.supervisor = Supervisor(SIM, "", hub, options, hill=lambda _: nullcontext({}), enduring=enduring)
         self.opened: Future[Recording] = Future()
 
     @property
@@ -68,6 +68,13 @@ class Bench:
         if answer.done():
             answer.result(0)
         return answer
+
+    def close(self) -> None:
+        """Stop what it has begun."""
+        self.supervisor._world.close()
+        self.supervisor._world.end()
+        self.supervisor._commands.end()
+        self.supervisor._commands.close()
 
     def arm(self) -> None:
         """Arm."""
@@ -131,10 +138,23 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr("service.processes.rig_session.prepare_programs", lambda _: None)
     made = Bench(tmp_path)
     yield made
-    made.supervisor._world.close()
-    made.supervisor._world.end()
-    made.supervisor._commands.end()
-    made.supervisor._commands.close()
+    made.close()
+
+
+@pytest.mark.usefixtures("bench")
+def test_who_does_not_endure_ends_at_once_with_the_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ProcessesInMemory, "fails", BadInputError("the address is in use: choose another one"))
+    other = Bench(tmp_path, enduring=False)
+
+    def ended() -> bool:
+        other.turn()
+        return other.supervisor._over()
+
+    other.arm()
+    wait_until(ended, "it ends", poll_s=0.001)
+    assert str(other.supervisor.now.loop.failure) == "the address is in use: choose another one"
+    assert other.moves == [IDLE, ARMING], "it is not disarmed first"
+    other.close()
 
 
 @pytest.mark.parametrize("story", STORIES.values(), ids=STORIES)

@@ -15,7 +15,7 @@ from rig.api.statement import Statement
 from rig.settings.model import AnalysisSettings
 from service.measuring.keeping import keep_problem, keep_result
 from service.measuring.results import measurement_of
-from service.recordings.digitized import digitized_downloads
+from service.recordings.download import digitized_downloads
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import refused
 

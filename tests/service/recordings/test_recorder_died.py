@@ -5,6 +5,8 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from recorder.checking.verify import verify
 from recorder.reading.info import info
 from recorder.recovering.recover import recover
@@ -69,6 +71,7 @@ def test_a_recording_goes_on_after_the_death_of_its_recorder(
     fault_table.tell("Processes", what, lost=f"{lost}, between the two logs", said=said)
 
 
+@pytest.mark.long  # what the service decides then is a row of a table in tests/service/supervision
 def test_a_recorder_that_dies_again_and_again_ends_the_recording_and_the_next_one_is_whole(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable
 ) -> None:

@@ -43,10 +43,10 @@ def decide(now: Situation, message: m.Message, at: Moment) -> tuple[Situation, l
     effects: list[m.Effect] = []
     if isinstance(message, RecorderReport):
         now = replace(now, heard=replace(now.heard, at=at.s))
-    if (follows := FOLLOWS.get(type(message))) is not None:
+    if (follows := DECISIONS.get(type(message))) is not None:
         now = follows(now, message, at, effects.append)
     current = now.recordings.current
-    if current is not None and (of_it := FOLLOWS_IN_A_RECORDING.get(type(message))) is not None:
+    if current is not None and (of_it := DECISIONS_IN_A_RECORDING.get(type(message))) is not None:
         now = of_it(now, current, message, at, effects.append)
     return now, effects
 
@@ -116,7 +116,7 @@ def _complaint(now: Situation, report: RecorderFailed, _: Moment, __: m.Do) -> S
 
 
 #: What follows from a message, by its type. From others nothing does.
-FOLLOWS: Final[Mapping[type, Callable[[Situation, Any, Moment, m.Do], Situation]]] = MappingProxyType(
+DECISIONS: Final[Mapping[type, Callable[[Situation, Any, Moment, m.Do], Situation]]] = MappingProxyType(
     {
         m.Arm: arming.arm,
         m.Disarm: arming.disarm,
@@ -148,7 +148,7 @@ FOLLOWS: Final[Mapping[type, Callable[[Situation, Any, Moment, m.Do], Situation]
     }
 )
 #: What follows in a recording that is in progress.
-FOLLOWS_IN_A_RECORDING: Final[
+DECISIONS_IN_A_RECORDING: Final[
     Mapping[type, Callable[[Situation, RecordingInProgress, Any, Moment, m.Do], Situation]]
 ] = MappingProxyType(
     {

@@ -33,7 +33,7 @@ from rig.transport.recorder_reports import (
 from service.processes.seen import CameraPresence, Processes, Seen
 from service.recordings.in_progress import RecordingInProgress
 from service.supervision import messages as m
-from service.supervision.decide import FOLLOWS, FOLLOWS_IN_A_RECORDING, is_over
+from service.supervision.decide import DECISIONS, DECISIONS_IN_A_RECORDING, is_over
 from service.supervision.situation import RigInUse, Situation
 from tests.service.supervision.situations import AT, GONE, HERE, LOG, RUNNING, SEEN, later, recording, situation, told
 from tests.support.rigs import SIM
@@ -85,7 +85,7 @@ def test_every_command_in_every_state(name: str, state: State) -> None:
 
 
 def test_every_message_has_its_place_in_the_tables() -> None:
-    known = FOLLOWS.keys() | FOLLOWS_IN_A_RECORDING.keys()
+    known = DECISIONS.keys() | DECISIONS_IN_A_RECORDING.keys()
     assert len(m.Command.__subclasses__()) > 10
     assert {*m.Command.__subclasses__(), *get_args(m.Happening)} <= known
 

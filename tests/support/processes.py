@@ -6,6 +6,7 @@ process inherits from the test process that started it.
 
 import os
 import signal
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -40,9 +41,10 @@ class Process:
         return f"process {self.pid} still runs: {self.command}"
 
 
-#: Processes that were there before us, and so are not ours: most on a computer. They are not looked at again, since a
-#: look takes the kernel some 50 us. A number is given to another process only when all others have had their turn.
-_older: set[int] = set()
+#: Processes that are not ours, by token: those that were there before us, and those of others, such as the workers
+#: beside us with their services and browsers. They are not looked at again, since a look takes the kernel some 50 us.
+#: A number is given to another process only when all others have had their turn.
+_foreign: defaultdict[str, set[int]] = defaultdict(set)
 #: Processes that serve many tests, and so do not belong to the one that used them first.
 _shared: set[int] = set()
 
@@ -72,17 +74,18 @@ def all_processes(token: str) -> frozenset[Process]:
     us = _read(here)
     assert us is not None
     pids = {int(name) for name in os.listdir("/proc") if name.isdecimal()}  # noqa: PTH208 - numbers, looked at often
-    _older.intersection_update(pids)
-    everyone = {pid: process for pid in pids - _older if (process := _read(pid))}
-    _older.update(pid for pid, process in everyone.items() if process.started < us.started)
-    return frozenset(
-        process
-        for process in everyone.values()
-        if process.pid != here
-        and process.pid not in _older
-        and _RESOURCE_TRACKER not in process.command
-        and (_descends(process, {here}, everyone) or _carries(process.pid, token))
-    )
+    foreign = _foreign[token]
+    foreign.intersection_update(pids)
+    everyone = {pid: process for pid in pids - foreign if pid != here and (process := _read(pid))}
+    ours = set()
+    for process in everyone.values():
+        if process.started < us.started:
+            foreign.add(process.pid)
+        elif _descends(process, {here}, everyone):
+            ours.add(process)
+        elif environment := _environment(process.pid):
+            (ours.add(process) if _has(environment, token) else foreign.add(process.pid))
+    return frozenset(process for process in ours if _RESOURCE_TRACKER not in process.command)
 
 
 def end(process: Process) -> None:
@@ -135,8 +138,13 @@ def _descends(process: Process, ancestors: Set[int], everyone: Mapping[int, Proc
     return False
 
 
-def _carries(pid: int, token: str) -> bool:
+def _environment(pid: int) -> bytes:
+    """The environment that a process began with; empty while it begins or ends, or if it is not ours to look at."""
     try:
-        return f"{TOKEN_VARIABLE}={token}".encode() in Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+        return Path(f"/proc/{pid}/environ").read_bytes()
     except OSError:
-        return False
+        return b""
+
+
+def _has(environment: bytes, token: str) -> bool:
+    return f"{TOKEN_VARIABLE}={token}".encode() in environment.split(b"\0")

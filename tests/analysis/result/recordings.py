@@ -35,7 +35,7 @@ from analysis.result.model import (
     phase_at,
 )
 from photogrammetry.geometry.rotation import rotation_from_vector
-from photogrammetry.jumper.stick_model import ANGLES, body_angles, slope
+from photogrammetry.jumper.stick_model import ANGLES, body_angles, slope, slope_and_heading
 from rig.arrays import Floats
 from rig.clocks import UtcNs
 from rig.pulse import PulseNumber
@@ -149,16 +149,19 @@ def true_quantities(jump_seed: int = 1, leg_deg: float = 0.0) -> Floats:
     """(n, 11) `QUANTITIES` without any error, one row a pulse, degrees, m, m/s."""
     m = model(jump_seed, leg_deg)
     velocity = m.gradient @ m.places[:, 2:4].mean(axis=1)
-    return np.stack([quantities(np.concatenate((x.ravel(), v))) for x, v in zip(m.places, velocity, strict=True)])
+    return quantities(np.concatenate((m.places.reshape(len(velocity), -1), velocity), axis=-1))
 
 
-def quantities(state: Floats) -> Floats:
-    """`QUANTITIES` (11,) of 24 coordinates of the places and the velocity of O."""
-    places, velocity = state[:24].reshape(8, 3), state[24:]
-    origin = (places[2] + places[3]) / 2
-    angles = np.degrees(body_angles(places[0], places[1], origin, places[5] - places[4], places[7] - places[6]))
-    attack = angles[4] - np.degrees(slope(velocity))
-    return np.array([*angles, attack, origin[2], np.linalg.norm(velocity), *velocity])
+def quantities(states: Floats) -> Floats:
+    """`QUANTITIES` (..., 11) of 24 coordinates of the places and the velocity of O (..., 27)."""
+    places, velocity = states[..., :24].reshape(*states.shape[:-1], 8, 3), states[..., 24:]
+    helmet, hip, *bindings = (places[..., k, :] for k in range(4))
+    origin = (bindings[0] + bindings[1]) / 2
+    right, left = (places[..., tail + 1, :] - places[..., tail, :] for tail in (4, 6))
+    angles = np.degrees(body_angles(helmet, hip, origin, right, left))
+    attack = angles[..., 4] - np.degrees(slope(velocity))
+    single = np.stack((attack, origin[..., 2], np.linalg.norm(velocity, axis=-1)), axis=-1)
+    return np.concatenate((angles, single, velocity), axis=-1)
 
 
 def _places(truth: TrueJump, pulse: int, leg_deg: float) -> Floats:
@@ -326,9 +329,9 @@ def _ski(state: Floats, tail: int, covariance: Floats, status: Status, i: int) -
     )
 
 
-def _slope_and_heading(state: Floats, tail: int) -> Floats:
-    along = state[3 * tail + 3 : 3 * tail + 6] - state[3 * tail : 3 * tail + 3]
-    return np.array([np.degrees(slope(along)), np.degrees(np.arctan2(along[1], along[0]))])
+def _slope_and_heading(states: Floats, tail: int) -> Floats:
+    places = states[..., 3 * tail : 3 * tail + 6]
+    return np.degrees(slope_and_heading(places[..., 3:] - places[..., :3]))
 
 
 def _status(place: int, i: int, *, smoothed: bool) -> Status:
@@ -346,7 +349,7 @@ def _cameras(place: int, i: int) -> tuple[str, ...]:
 
 def _derivative(function: Callable[[Floats], Floats], x: Floats, step: float = 1e-5) -> Floats:
     steps = step * np.eye(len(x))
-    return np.stack([(function(x + d) - function(x - d)) / (2 * step) for d in steps], axis=-1)
+    return ((function(x + steps) - function(x - steps)) / (2 * step)).T
 
 
 @cache

@@ -6,7 +6,6 @@ from functools import partial
 from importlib.metadata import version
 
 from fastapi import FastAPI
-from fastapi.routing import APIRoute
 
 from analysis.digitizing.desks import Desks
 from analysis.digitizing.files import DeskFiles
@@ -23,7 +22,7 @@ from webpanel.page_files import serve_page
 from webpanel.problems import handle_errors
 from webpanel.routes.athletes import athletes_router
 from webpanel.routes.calibrating import calibrating_router
-from webpanel.routes.common import COMMON
+from webpanel.routes.common import add_routers
 from webpanel.routes.contents import contents_router
 from webpanel.routes.digitizing import digitizing_router
 from webpanel.routes.events import Changes, events_router
@@ -67,8 +66,7 @@ def create_app(
 
     app = FastAPI(
         title="Svev", version=version("svev"), description=DESCRIPTION, docs_url=None, redoc_url=None,
-        redirect_slashes=False, lifespan=lifespan, responses=COMMON,
-        generate_unique_id_function=lambda route: route.name,
+        redirect_slashes=False, lifespan=lifespan,
     )  # fmt: skip
     app.state.streams = streams
     warn = partial(service.tell, "warning", "access")
@@ -93,9 +91,7 @@ def create_app(
         links_router(door, service),
         observing_router(service, metrics),
     )
-    for router in routers:
-        app.include_router(router)
-    routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
+    routes = add_routers(app, routers)
     handle_errors(app, routes)
     serve_page(app, "/index.html")
     app.add_middleware(

@@ -6,7 +6,6 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 from fastapi.responses import RedirectResponse
-from fastapi.routing import APIRoute
 
 from analysis.digitizing.desks import Desks
 from webpanel.door.access import Access
@@ -15,7 +14,7 @@ from webpanel.door.logins import Door
 from webpanel.door.streams import OpenStreams
 from webpanel.page_files import serve_page
 from webpanel.problems import handle_errors
-from webpanel.routes.common import COMMON
+from webpanel.routes.common import add_routers
 from webpanel.routes.digitizing import digitizing_router
 from webpanel.routes.login import login_router
 
@@ -35,7 +34,7 @@ def create_digitizing_app(desks: Desks, access: Access, page: str) -> FastAPI:
 
     app = FastAPI(
         title="Svev: measuring by hand", version=version("svev"), docs_url=None, redoc_url=None, redirect_slashes=False,
-        lifespan=lifespan, responses=COMMON, generate_unique_id_function=lambda route: route.name,
+        lifespan=lifespan,
     )  # fmt: skip
     streams = app.state.streams = OpenStreams()
 
@@ -44,9 +43,7 @@ def create_digitizing_app(desks: Desks, access: Access, page: str) -> FastAPI:
 
     door = Door(access, unheard)
     routers = digitizing_router(desks, streams.events), login_router(door, unheard)
-    for router in routers:
-        app.include_router(router)
-    handle_errors(app, [route for router in routers for route in router.routes if isinstance(route, APIRoute)])
+    handle_errors(app, add_routers(app, routers))
     serve_page(app)
     app.add_middleware(Guard, door=door, note=unheard, visit=unheard)
 

@@ -1,11 +1,11 @@
 """What all routes share: routers that refuse unknown parameters, the documentation of refusals, common parameters."""
 
 import re
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterable
 from http import HTTPStatus
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Body, Path, Request, Response
+from fastapi import APIRouter, Body, FastAPI, Path, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from isal import igzip as gzip
@@ -138,6 +138,25 @@ class StrictRoute(APIRoute):
         return checked
 
 
-def strict_router(tag: str) -> APIRouter:
-    """Make a router of strict routes below `/api`; `tag` is their chapter of the documentation."""
-    return APIRouter(prefix="/api", tags=[tag], route_class=StrictRoute)
+def strict_router(tag: str, prefix: str = "/api") -> APIRouter:
+    """Make a router of strict routes below `prefix`; `tag` is their chapter of the documentation."""
+    return APIRouter(
+        prefix=prefix,
+        tags=[tag],
+        route_class=StrictRoute,
+        responses=COMMON,
+        generate_unique_id_function=lambda route: route.name,
+    )
+
+
+def add_routers(app: FastAPI, routers: Iterable[APIRouter]) -> list[APIRoute]:
+    """Give the routes of routers to an application; they are complete as they are.
+
+    `app.include_router` would make each of them once more, at the first request: that takes as long as the first time.
+
+    Returns:
+        The routes.
+    """
+    routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
+    app.router.routes.extend(routes)
+    return routes

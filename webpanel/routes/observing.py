@@ -15,7 +15,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rig.api.fields import Model
 from service.seam.rig import RigService
-from webpanel.routes.common import Responses, StrictRoute
+from webpanel.routes.common import Responses, strict_router
 
 _METHODS = frozenset({"GET", "HEAD", "POST", "PATCH", "DELETE", "PUT", "OPTIONS"})
 
@@ -78,7 +78,7 @@ class CountRequests:
 
 def observing_router(service: RigService, metrics: Metrics) -> APIRouter:
     """The routes outside `/api`."""
-    router = APIRouter(tags=["Observing"], route_class=StrictRoute)
+    router = strict_router("Observing", prefix="")
 
     @router.get("/metrics", response_class=PlainTextResponse)
     def get_metrics(accept: Annotated[str, Header(include_in_schema=False)] = "") -> Response:

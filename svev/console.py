@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from rig.errors import StorageError
 from rig.phrase import escaped
 
 
@@ -53,9 +54,31 @@ def visible(text: str) -> str:
     )
 
 
+@contextmanager
+def _to_standard_output() -> Iterator[None]:
+    """Say what cannot be written: what a command has done is done, and no path of its own is at fault.
+
+    Raises:
+        StorageError: the disk behind standard output refuses.
+    """
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise StorageError(
+            f"standard output: cannot be written ({error.strerror}); make room there, or write it elsewhere"
+        ) from None
+
+
 def say(line: str, *, aside: bool = False) -> None:
     """Print one line for people; `aside`: on standard error, beside a result on standard output."""
-    (_stderr if aside else _stdout).print(visible(line), markup=False)
+    if aside:
+        _stderr.print(visible(line), markup=False)
+        return
+    with _to_standard_output():
+        _stdout.print(visible(line), markup=False)
 
 
 def say_text(text: str) -> None:
@@ -66,19 +89,20 @@ def say_text(text: str) -> None:
 
 def say_marked(mark: str, style: str, line: str) -> None:
     """Print one indented line for people after a coloured mark, e.g. PASS."""
-    _stdout.print(Text.assemble("  ", (mark, style), "  ", visible(line)))
+    with _to_standard_output():
+        _stdout.print(Text.assemble("  ", (mark, style), "  ", visible(line)))
 
 
 def print_json(result: dict[str, Any]) -> None:
     """Print the result as one JSON object, the last thing on standard output."""
-    sys.stdout.write(json.dumps(result, indent=2) + "\n")
-    sys.stdout.flush()
+    with _to_standard_output():
+        sys.stdout.write(json.dumps(result, indent=2) + "\n")
 
 
 def print_json_line(result: dict[str, Any]) -> None:
     """Print one of many results as a JSON object on one line, at once."""
-    sys.stdout.write(json.dumps(result) + "\n")
-    sys.stdout.flush()
+    with _to_standard_output():
+        sys.stdout.write(json.dumps(result) + "\n")
 
 
 def complain(line: str) -> None:

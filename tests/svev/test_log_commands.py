@@ -337,3 +337,15 @@ def test_without_standard_output_the_exit_code_tells(command: str, closed: str, 
     done = subprocess.run(["/bin/sh", "-c", program], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == (0 if command == "schema" else 3)
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", ["verify LOG", "verify LOG --json", "info LOG"])
+def test_a_full_disk_behind_standard_output_is_named(command: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    write_log(path, [ALL_OK] * 3)
+    program = f"{sys.executable} -m svev {command.replace('LOG', str(path))} >/dev/full"
+    done = subprocess.run(["/bin/sh", "-c", program], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 4
+    assert done.stderr == (
+        "svev: standard output: cannot be written (No space left on device); make room there, or write it elsewhere\n"
+    )

@@ -223,6 +223,15 @@ def test_a_terminal_that_is_closed_ends_the_recording_properly(
     fault_table.tell(PROCESSES, what, lost=0, said='"stopped_early": true', code=code)
 
 
+def test_a_full_disk_behind_standard_error_ends_no_recording(tmp_path: Path, loopback: Loopback) -> None:
+    rig, out = write_rig(tmp_path, "sim", loopback), tmp_path / "logs"
+    command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "1", "--out", str(out), "--json"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=full, text=True, timeout=60, check=False)
+    assert done.returncode == 0
+    assert verify(Path(json.loads(done.stdout)["log"])).verdict == "clean"
+
+
 @pytest.mark.parametrize("backend", repeats(["sim", "aravis"]))
 def test_a_killed_grabber_costs_its_own_frames_only(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str

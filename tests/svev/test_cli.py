@@ -67,6 +67,12 @@ def test_help_has_a_short_name_everywhere(words: tuple[str, ...], capsys: pytest
     assert "-h, --help" in short
 
 
+def test_no_list_of_commands_ends_in_dots() -> None:
+    for path, command in _walk(typer.main.get_command(cli.command_line())):
+        for name, below in getattr(command, "commands", {}).items():
+            assert not below.get_short_help_str(limit=56).endswith("..."), f"svev {path} {name}: give it a short_help"
+
+
 def test_nothing_is_overwritten_unless_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "rig.schema.json"
     assert cli.main(["schema", "-o", str(path)]) == 0

@@ -31,7 +31,7 @@ Port = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="end with one JSON object")]
 
 
-@app.command("list")
+@app.command("list", short_help="List the cameras behind all ports.")
 def list_command(
     interface: Port = None,
     rig: Annotated[
@@ -76,7 +76,7 @@ def list_command(
             console.say("where the network carries no broadcast, give the addresses: svev cameras list --rig RIG.toml")
 
 
-@app.command()
+@app.command(short_help="Show the features of a camera.")
 def show(
     address: Annotated[str, typer.Argument(metavar="ADDRESS", help="IP address of the camera")],
     as_json: Json = False,
@@ -101,7 +101,7 @@ def show(
             console.say(f"  {feature.name} = {feature.value}{unit}{allowed}")
 
 
-@app.command("set-ip")
+@app.command("set-ip", short_help="Give a camera an IP address.")
 def set_ip(
     camera: Annotated[
         str, typer.Argument(metavar="CAMERA", help="serial number, MAC address or present IP address of the camera")

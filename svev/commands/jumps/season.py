@@ -27,7 +27,7 @@ def season() -> None:
     """
 
 
-@app.command("run", no_args_is_help=True)
+@app.command("run", short_help="Measure all logs of a campaign.", no_args_is_help=True)
 def run_command(
     campaign: CampaignPath,
     scheduler: Annotated[
@@ -135,7 +135,7 @@ PlaceOption = Annotated[
 ]
 
 
-@app.command("query", no_args_is_help=True)
+@app.command("query", short_help="Ask the tables of a season.", no_args_is_help=True)
 def query_command(
     sql: Annotated[str | None, typer.Argument(metavar="SQL", help="statement of DuckDB", show_default=False)] = None,
     place: PlaceOption = Path(),
@@ -186,7 +186,7 @@ def query_command(
     console.say(f"{len(rows)} rows in {took_ms:.0f} ms", aside=True)
 
 
-@app.command("compare")
+@app.command("compare", short_help="Compare athletes and hills.")
 def compare_command(
     place: PlaceOption = Path(),
     quantity: Annotated[str, typer.Option(metavar="NAME", help="alpha, height, speed, ...")] = "alpha",

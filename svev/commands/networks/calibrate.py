@@ -69,7 +69,10 @@ def calibrate(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Calibrate cameras: free adjustment of a frame of unknown targets with self-calibration.
+    """Calibrate cameras: principal distance, principal point and distortion, each with its sigma.
+
+    With --pictures the targets of svev target are found in pictures or logs, and the last lines say whether it is good
+    enough, or which pictures to take. Else a network file is adjusted: free, with self-calibration.
 
     Exit codes: 0 calibrated, 2 bad input, 3 not solvable (the result says what is missing), 4 not converged, or refused
     because the images contradict each other.

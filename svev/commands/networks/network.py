@@ -24,7 +24,7 @@ def network() -> None:
     """
 
 
-@app.command("import", no_args_is_help=True)
+@app.command("import", short_help="Make a network file of other programs' files.", no_args_is_help=True)
 def import_command(
     files: Annotated[
         list[Path],
@@ -75,7 +75,7 @@ def import_command(
         console.say(f"network in {output}: " + ", ".join(f"{count} {what}" for what, count in counts.items()))
 
 
-@app.command("export", no_args_is_help=True)
+@app.command("export", short_help="Write files for other programs.", no_args_is_help=True)
 def export_command(
     source: Annotated[
         Path,

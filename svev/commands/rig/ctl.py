@@ -43,8 +43,8 @@ start_list_app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(start_list_app, name="startlist")
-app.command()(log)
-app.command()(doctor)
+app.command(short_help="Show what happens, until Ctrl-C.")(log)
+app.command(short_help="Have the service examine everything.")(doctor)
 
 Id = Annotated[str, typer.Argument(metavar="ID", help="id of the recording, see svev ctl list")]
 Wait = Annotated[
@@ -74,7 +74,7 @@ def _target(
     context.obj = RestClient(url, read_token(token_file))
 
 
-@app.command()
+@app.command(short_help="Show the state of rig, cameras and disk.")
 def status(context: typer.Context, as_json: Json = False) -> None:
     """Show the state of the rig, its cameras, the disk and the recording in progress.
 
@@ -137,11 +137,11 @@ def start(
     show(call(context, "POST", "/api/recordings", order), recording_lines, as_json)
 
 
-@app.command()
+@app.command(short_help="Have a recording measured, and show it.")
 def measure(context: typer.Context, recording: Id, wait_s: Wait = 0.0, as_json: Json = False) -> None:
     """Have a recording measured, again if it was measured before, and show its jumps; it waits while one is recorded.
 
-    Example: svev ctl measure 20260214-101530 --wait 120
+    Example: svev ctl measure 2026-02-14T10-15-30Z --wait 120
     """
     path, until = f"{path_of(recording)}/measurement", time.monotonic() + wait_s
     answer = call(context, "POST", path)
@@ -171,7 +171,7 @@ def stop(
     show(call(context, "POST", f"{path_of(recording)}/stop"), recording_lines, as_json)
 
 
-@app.command()
+@app.command(short_help="Record what has just happened.")
 def save(
     context: typer.Context,
     seconds: Annotated[
@@ -213,7 +213,7 @@ def list_(
     show({"recordings": found}, recordings_lines, as_json)
 
 
-@app.command()
+@app.command(short_help="Change session fields of a recording.")
 def session(
     context: typer.Context,
     recording: Id,
@@ -233,7 +233,7 @@ def session(
     show(call(context, "PATCH", path_of(recording), change), recording_lines, as_json)
 
 
-@app.command("next")
+@app.command("next", short_help="Show or change the next jumper.")
 def next_(
     context: typer.Context,
     athlete: Athlete = None,
@@ -262,7 +262,7 @@ def skip(context: typer.Context, as_json: Json = False) -> None:
     show(call(context, "POST", "/api/next-jumper/skip"), start_list_lines, as_json)
 
 
-@start_list_app.command("show")
+@start_list_app.command("show", short_help="Show who has jumped, is next, and waits.")
 def show_start_list(context: typer.Context, as_json: Json = False) -> None:
     """Show the start list: who has jumped, who is next, who waits.
 
@@ -271,7 +271,7 @@ def show_start_list(context: typer.Context, as_json: Json = False) -> None:
     show(call(context, "GET", "/api/start-list"), start_list_lines, as_json)
 
 
-@start_list_app.command("load")
+@start_list_app.command("load", short_help="Replace the start list by a table.")
 def load_start_list(
     context: typer.Context,
     table: Annotated[
@@ -297,7 +297,7 @@ def load_start_list(
     show(call(context, "PUT", path, content), start_list_lines, as_json)
 
 
-@start_list_app.command("undo")
+@start_list_app.command("undo", short_help="Take the last change back.")
 def undo(context: typer.Context, as_json: Json = False) -> None:
     """Take the last change of the start list back.
 
@@ -324,7 +324,7 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
     show(call(context, "POST", f"{path_of(recording)}/restore"), recording_lines, as_json)
 
 
-@app.command()
+@app.command(short_help="Fetch files of recordings, and check them.")
 def download(
     context: typer.Context,
     recordings: Annotated[list[str], typer.Argument(metavar="ID", help="ids of the recordings, see svev ctl list")],
@@ -354,7 +354,7 @@ def download(
     show({"files": found}, lambda answer: answer["files"], as_json)
 
 
-@app.command()
+@app.command(short_help="Say what lies in the trash, or empty it.")
 def trash(
     context: typer.Context,
     empty: Annotated[bool, typer.Option("--empty", help="remove everything in it for good")] = False,

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from analysis.measurements.model import POINTS
 from bench.analysis.hill_logs import HillLog
 from rig.arrays import Floats
+from simrig.world.conditions.effects import MissingMarker
 from tests.analysis.digitizing.hill import adopt, orientation_of
 from tests.analysis.simulated import SIZE, training
 from tests.browser.conftest import Open
@@ -80,10 +82,18 @@ class Desk:
         assert answer.status_code == 200, answer.text
 
 
-@pytest.fixture(scope="session")
-def rendered() -> HillLog:
+@pytest.fixture
+def markers() -> bool:
+    """Whether the jumper wears markers."""
+    return True
+
+
+@pytest.fixture
+def rendered(markers: bool) -> HillLog:
     """Twenty pulses of the rendered hill, to be copied."""
-    return kept_hill_log(training(), range(36, 56))
+    bare = () if markers else tuple(MissingMarker(marker=name) for name in POINTS)
+    jumper = training().jumper.model_copy(update={"missing_markers": bare})
+    return kept_hill_log(training().model_copy(update={"jumper": jumper}), range(36, 56))
 
 
 @pytest.fixture

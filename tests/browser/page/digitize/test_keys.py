@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from analysis.measurements.model import POINTS
 from rig.arrays import Floats
 from tests.analysis.simulated import SIZE
 from tests.browser.conftest import Open
 from tests.browser.page.digitize.conftest import PULSE, Desk, canvas_of, enter, settled
 from tests.support.waiting import wait_until
 
+CAMERAS = ("K1", "K2", "K3")
 #: Steps of the crosshair, CSS px, and of a mark, px of the image.
 STEPS = (12, 1)
 NUDGES = (1.0, 0.1)
@@ -79,41 +81,60 @@ def _place(page: Page, camera: str, thing: str, true: Floats) -> None:
 
 
 @pytest.mark.long
-def test_a_jump_is_measured_by_keys(desk: Desk, open_page: Open) -> None:
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("markers", [False])
+def test_a_jump_without_markers_is_measured_by_keys(desk: Desk, open_page: Open) -> None:
     page = enter(open_page, desk, width=1280, height=800, reduced_motion="reduce")
-    for camera in ("K1", "K2", "K3"):
+    placed = 0
+    for camera in CAMERAS:
         for side, ski in desk.log.truth[PULSE]["skis"].items():
             for along in (-0.9, 0.9):
                 true = desk.image(camera, np.array(ski["point"]) + along * np.array(ski["direction"]))
                 _place(page, camera, f"{side} ski", true)
-        for thing in ("P1", "P2", "P3", "P4"):
+                placed += 1
+        for thing in POINTS:
             _place(page, camera, thing, desk.true(camera, thing))
-    for camera in ("K1", "K2", "K3"):
-        for thing in ("P1", "P2", "P3", "P4"):
+            placed += 1
+    assert placed < 60
+    for camera in CAMERAS:
+        for thing in POINTS:
             wait_until(lambda: _off(desk, camera, thing) < 0.1, f"{thing} is where it is to be in {camera}", 20)  # noqa: B023 - called at once
     for ski in ("left ski", "right ski"):
         _choose(page, "K1", ski)
         page.keyboard.press("e")
         expect(page.locator("#track-said li")).to_contain_text("it was refined", timeout=60_000)
         expect(page.locator("#track-said li")).to_contain_text("Right" if ski == "right ski" else "Left")
-        marks = [desk.mark(camera, ski) for camera in ("K1", "K2", "K3")]
+        marks = [desk.mark(camera, ski) for camera in CAMERAS]
         sources = [mark["vertices"][0]["source"] for mark in marks if mark is not None]
         assert sources.count("refined") >= 2  # where an image shows it well
-    _choose(page, "K1", "P1")
-    page.keyboard.press("2")
-    expect(page.locator("#track-share")).to_be_visible()
-    expect(page.locator("#track-said li")).to_have_count(6, timeout=90_000)
-    expect(page.locator("#track-share")).to_be_hidden()
-    for pulse in (PULSE, PULSE + 2):
-        truth = desk.log.truth[pulse]["points"]
-        space = desk.view(pulse)["space"]
-        for thing in ("P1", "P2", "P3", "P4"):
-            off = np.array(space[thing]["X"]) - truth[thing]
-            assert (np.abs(off) < 6 * np.array(space[thing]["sigma"])).all(), (pulse, thing)
-        lines = desk.view(pulse)["lines"]
-        for side, ski in desk.log.truth[pulse]["skis"].items():
-            slope, angle = lines[f"{side} ski"]["slope"], math.degrees(math.asin(ski["direction"][2]))
-            assert abs(slope["value"] - angle) < 6 * slope["sigma"], (pulse, side)
+    for key in ("1", "2"):  # back, and on
+        _choose(page, "K1", "P1")
+        page.keyboard.press(key)
+        expect(page.locator("#track-share")).to_be_visible()
+        expect(page.locator("#track-share")).to_be_hidden(timeout=90_000)
+        expect(page.locator("#track-said li")).to_have_count(6)
+    _is_true(desk)
     page.locator("#compute").focus()
     page.keyboard.press("Enter")
     expect(page.locator("#result-state")).to_contain_text("Computed.", timeout=60_000)
+
+
+def _is_true(desk: Desk) -> None:
+    """All points and skis of nearly all pulses are known, and as near to the truth as they say."""
+    points, slopes = [], []
+    for pulse, truth in desk.log.truth.items():
+        view = desk.view(pulse)
+        for thing in POINTS:
+            if view["space"].get(thing, {}).get("X") is not None:
+                off = np.array(view["space"][thing]["X"]) - truth["points"][thing]
+                points.append(off / view["space"][thing]["sigma"])
+        for side, ski in truth["skis"].items():
+            slope = view["lines"].get(f"{side} ski", {}).get("slope")
+            if slope is not None:
+                slopes.append((slope["value"] - math.degrees(math.asin(ski["direction"][2]))) / slope["sigma"])
+    pulses = len(desk.log.truth)
+    assert len(points) >= 0.95 * 4 * pulses
+    assert len(slopes) >= 0.9 * 2 * pulses
+    for errors in (points, slopes):
+        assert np.abs(errors).max() < 6
+        assert np.sqrt(np.mean(np.square(errors))) < 2  # those of one start are shared by all its pulses

@@ -44,15 +44,21 @@ def _await_helper(service: Serving, state: str, taken: int = 0) -> dict[str, Any
     return view
 
 
+def _programs() -> list[int]:
+    """Processor time of the helper's program, in ticks of 10 ms; empty: it is being started."""
+    own = own_processes(os.environ[TOKEN_VARIABLE])
+    return [each.cpu_ticks for each in own if "service.calibrating." in each.command]
+
+
 def _ticks() -> int:
-    """Processor time of the helper's program, in ticks of 10 ms."""
-    (program,) = (each for each in own_processes(os.environ[TOKEN_VARIABLE]) if "service.calibrating." in each.command)
-    return program.cpu_ticks
+    """The same of the one that runs."""
+    (ticks,) = _programs()
+    return ticks
 
 
 def _record(service: Serving) -> None:
     """A recording during which the helper stands still, from its first moment on."""
-    wait_until(lambda: _ticks() > _AT_WORK, "it is at work", _PATIENCE_S, 0.05)
+    wait_until(lambda: max(_programs(), default=0) > _AT_WORK, "it is at work", _PATIENCE_S, 0.05)
     recording = service.post("/api/recordings")["id"]
     used = _ticks()
     held = _await_helper(service, "held")

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -90,21 +91,25 @@ def test_drawings_are_for_light_and_dark_and_fetch_nothing(drawing: Path) -> Non
 def test_commands_and_targets_exist(page: Path) -> None:
     text = re.sub(r"^(### |- \[`).*$", "", page.read_text(), flags=re.MULTILINE)  # headings and index quote messages
     code = " ; ".join([*re.findall(r"`([^`\n]+)`", text), *(body for _, body in FENCE.findall(text))])
-    group = typer.main.get_command(cli.command_line())
-    assert isinstance(group, TyperGroup)
-    assert set(re.findall(r"(?<![\w/])svev ([a-z]+)", code)) <= set(group.commands) | LATER
+    assert set(re.findall(r"(?<![\w/])svev ([a-z]+)", code)) <= set(_command_line().commands) | LATER
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     assert set(re.findall(r"\bmake ([a-z]+)", code)) <= targets
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)
 def test_options_in_the_examples_exist(page: Path) -> None:
-    group = typer.main.get_command(cli.command_line())
-    assert isinstance(group, TyperGroup)
     for language, body in FENCE.findall(page.read_text()):
         for command, rest in re.findall(r"^svev ([a-z]+)(.*)$", body if language == "sh" else "", re.MULTILINE):
-            known = {option for parameter in _parameters(group, [command, *rest.split()]) for option in parameter.opts}
+            parameters = _parameters(_command_line(), [command, *rest.split()])
+            known = {option for parameter in parameters for option in parameter.opts}
             assert set(re.findall(r"--[a-z-]+", rest)) <= known, f"svev {command}{rest}"
+
+
+@cache
+def _command_line() -> TyperGroup:
+    group = typer.main.get_command(cli.command_line())
+    assert isinstance(group, TyperGroup)
+    return group
 
 
 def _parameters(command: Any, words: list[str]) -> list[Any]:

@@ -112,6 +112,16 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(_ReliabilityWriter(config))
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Collect no garbage meanwhile: nearly all that importing and collecting make stays, and looking takes a sixth."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+
+
 def pytest_collection_finish() -> None:
     """Let the garbage collector leave alone what stays until the end: the modules, and thousands of tests."""
     gc.collect()

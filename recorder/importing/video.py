@@ -162,8 +162,8 @@ class Video:
 
     def _cut_short(self) -> str:
         """What the file says of frames that are not there, in words; empty: nothing."""
-        if self._declared is not None and self._frames < self._declared:
-            return f"ends after frame {self._frames}, and the file speaks of {self._declared}"
+        if self._declared is not None and self._last < self._declared:  # AVI declares those that were dropped, too
+            return f"ends after frame {self._last}, and the file speaks of {self._declared}"
         expected = self.expected
         if self._declared is None and expected is not None and self._last < expected - 1:
             return f"ends after frame {self._last}, and by its duration it has {expected}"

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from photogrammetry.exchange.importing import import_network
@@ -284,6 +284,8 @@ def _written(rows: list[tuple[str, ...]], dialect: dict[str, Any]) -> bytes:
 def test_a_table_in_any_dialect_is_read_right_or_refused(
     rows: list[tuple[str, ...]], dialect: dict[str, Any], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
+    # Plainly written, a name in quotes is that without them.
+    assume(dialect["quoting"] is not None or not any(name.lstrip().startswith('"') for name, *_ in rows))
     path = _file(tmp_path_factory.getbasetemp(), _written(rows, dialect), f"any{dialect['ending']}")
     try:
         imported = import_network([path])

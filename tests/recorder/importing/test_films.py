@@ -185,6 +185,23 @@ def test_a_phone_held_upright_gives_frames_as_its_camera_had_them(tmp_path: Path
     assert any("turned by -90 degrees" in remark for remark in film.remarks)
 
 
+@pytest.mark.parametrize(("name", "codec"), [("K1.mp4", "libx264"), ("K1.mov", "mjpeg"), ("K1.webm", "libvpx")])
+def test_a_dropped_frame_is_lost_in_every_container(name: str, codec: str, tmp_path: Path) -> None:
+    numbers = [*range(1, 20), *range(21, 41)]
+    frames = [np.full(picture(1).shape, 20 + 5 * number, np.uint8) for number in numbers]
+    ticks = [40 * (number - 1) for number in numbers]
+    path = write_video(
+        tmp_path / name, frames, rate=25, codec=codec, stored="yuvj420p" if codec == "mjpeg" else "yuv420p", ticks=ticks
+    )
+    film = Video(path, 25)
+    taken = {each.number: each for each in film.frames(1)}
+    assert sorted(taken) == list(range(1, 41))
+    assert [number for number, each in taken.items() if each.status is FrameStatus.LOST] == [20]
+    bright = [float(each.pixels.mean()) for _, each in sorted(taken.items()) if each.pixels is not None]
+    assert bright == sorted(bright)
+    assert film.remarks == ("frames left out among its times: 1; these frames are lost",)
+
+
 def test_frames_that_do_not_come_evenly_are_said(tmp_path: Path) -> None:
     ticks = [0, 20, 40, 60, 80, 110, 120, 140, 160, 180]
     film = Video(write_video(tmp_path / "K1.mkv", FRAMES, ticks=ticks), 50)

@@ -281,7 +281,7 @@ def load_scenario(path: Path) -> Scenario:
 
 def _content(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     """The keys of a scenario file and of its bases; `above` are the files that lead to it."""
-    own = read_toml(path)
+    own = read_toml(path, kind="scenario")
     board = own.get("board")
     if isinstance(board, dict) and isinstance(board.get("pattern"), str):
         board["pattern"] = str((path.parent / board["pattern"]).resolve())

@@ -88,7 +88,7 @@ def test_a_wrong_scenario_is_refused_in_one_line(tmp_path: Path, edit: tuple[str
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match=r"nowhere\.toml: no such file"):
+    with pytest.raises(BadInputError, match=r"nowhere\.toml: no such file; name an existing scenario"):
         load_scenario(tmp_path / "nowhere.toml")
 
 

@@ -13,6 +13,7 @@ from analysis.targets.detection import Sight, find_targets
 from analysis.targets.moving import MOVED, shift
 from analysis.targets.network_of import FEWEST_CORNERS, Picture
 from analysis.targets.pattern import Layout
+from analysis.targets.views import SHARP_PX
 from rig.errors import BadInputError
 from rig.images.picture import Grey
 from rig.settings.strict_toml import read_bytes
@@ -143,7 +144,7 @@ def _different(pictures: Sequence[Picture]) -> list[Picture]:
     if not full:
         return list(pictures[:1])
     usual = float(np.median([picture.sight.blur for picture in full]))
-    full = [picture for picture in full if picture.sight.blur <= _SHARP * usual]
+    full = [picture for picture in full if picture.sight.blur <= _SHARP * max(usual, SHARP_PX)]
     least = MOVED * float(np.hypot(*full[0].sight.size))
     while True:
         kept: list[Picture] = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.targets.network_of import Picture
 from analysis.targets.pattern import Layout, target_of
-from analysis.targets.views import PICTURES, any_rolled, covered_cells, empty_parts, more_pictures
+from analysis.targets.views import PICTURES, SHARP_PX, any_rolled, covered_cells, empty_parts, more_pictures
 from photogrammetry.adjustment.solution.adjustment import Adjustment
 from photogrammetry.geometry.camera_model import Lens, linearise, undistort
 from rig.arrays import Floats
@@ -199,7 +199,7 @@ def _advice(a: Adjustment, camera: int, pictures: Sequence[Picture]) -> Iterator
         text = "focus the lens: edges are {width} px wide in all pictures"
         yield phrase("target_unsharp", text, width=round(usual, 1))
     for picture in pictures:
-        if picture.sight.blur > _BLURRED * usual:
+        if picture.sight.blur > _BLURRED * max(usual, SHARP_PX):
             text = "take {picture} again: blurred (edges {width} px wide, usual {usual})"
             width, wide = round(picture.sight.blur, 1), round(usual, 1)
             yield phrase("target_blurred", text, picture=picture.name, width=width, usual=wide)

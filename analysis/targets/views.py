@@ -24,6 +24,8 @@ _ROLLED_DEG: Final = (60.0, 120.0)
 _ROLLED: Final = 2  # pictures that are to be turned by 90 degrees
 #: 30 to 45 degrees are asked for; with so much on both sides the views differ by enough.
 _ASIDE_DEG: Final = 20.0
+#: Width of the edges that a good lens in focus shows: others are not blurred for being wider than narrower ones.
+SHARP_PX: Final = 0.7
 _NEARER: Final = 1.15  # largest over smallest distance
 
 

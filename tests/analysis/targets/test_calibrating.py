@@ -160,6 +160,10 @@ def test_blurred_pictures_are_named() -> None:
     pictures[3] = replace(pictures[3], sight=replace(pictures[3].sight, blur=2.4))
     (verdict,) = _calibrated(pictures).verdicts
     assert tuple(map(str, verdict.advice)) == ("take K1/3 again: blurred (edges 2.4 px wide, usual 0.8)",)
+    for n, picture in enumerate(pictures):  # all are sharp, some sharper than lenses are
+        pictures[n] = replace(picture, sight=replace(picture.sight, blur=0.6 if n == 3 else 0.3))
+    (verdict,) = _calibrated(pictures).verdicts
+    assert verdict.advice == ()
 
 
 @pytest.mark.parametrize(

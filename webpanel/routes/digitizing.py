@@ -70,7 +70,8 @@ _IMPORTED: Final = {
     "application/zip": "dltdv.zip",
 }
 Exported = Annotated[
-    Literal["measurements.json", "marks.csv", "dltdv.zip", "argus.zip"], Path(description="name of the file")
+    Literal["measurements.json", "network.json", "marks.csv", "dltdv.zip", "argus.zip"],
+    Path(description="name of the file"),
 ]
 Operator = Annotated[OperatorName, Path(examples=["Anna"])]
 Pulse = Annotated[int, Path(ge=0, le=2**53, description="number of the pulse", examples=[1])]
@@ -216,7 +217,7 @@ def _add_results(router: APIRouter, opened: Callable[[str], Desk], base: str) ->
 
     @router.get(base + "/export/{name}", response_class=Response, responses=_FILE | refusals(404))
     async def export_marks(desk: AtDesk, operator: Operator, name: Exported) -> Response:
-        """The marks as a file: measurements, a table, or the folder of DLTdv or Argus Clicker."""
+        """The marks as a file: measurements, a network of clicked balls, a table, or the folder of DLTdv or Argus."""
         content = await run_sync(_delivered, desk, operator, name)
         headers = {"Content-Disposition": attachment(f"{operator}-{name}")}
         return Response(content, media_type="application/octet-stream", headers=headers)

@@ -10,13 +10,16 @@ from analysis.digitizing.desk import Desk
 from analysis.digitizing.exchange.formats import exported, imported
 from analysis.digitizing.marks.journal import Entered, Key
 from analysis.digitizing.marks.things import LINES
+from analysis.digitizing.programs.clicked_balls import clicked_network
 from analysis.measurements.file import read_measurements, write_measurements
 from analysis.measurements.model import Source
+from photogrammetry.network.file_writer import laid_out, network_to_json
 from rig.api.digitizing import Changed, MarkSource, MarkState
 from rig.errors import BadInputError
 from rig.phrase import phrase
 
 MEASUREMENTS: Final = "measurements.json"
+NETWORK: Final = "network.json"
 _SOURCES: Final = {Source.BY_HAND: MarkSource.HAND, Source.AUTOMATIC: MarkSource.AUTOMATIC}
 
 
@@ -26,7 +29,7 @@ def delivered(desk: Desk, operator: str, name: str) -> bytes:
     Args:
         desk: of the log.
         operator: whose marks.
-        name: `measurements.json`, `marks.csv`, `dltdv.zip` or `argus.zip`.
+        name: `measurements.json`, `network.json`, `marks.csv`, `dltdv.zip` or `argus.zip`.
 
     Raises:
         BadInputError: the marks do not go into such a file.
@@ -34,6 +37,12 @@ def delivered(desk: Desk, operator: str, name: str) -> bytes:
     if name == MEASUREMENTS:
         return _measurements(desk, operator)
     marks, system = desk.session(operator).everything(), desk.programs.orienting.system
+    if name == NETWORK:
+        survey = desk.programs.orienting.survey
+        if survey is None:
+            text = "a network holds the cameras and points of a survey: name it with --survey"
+            raise BadInputError(phrase("hand_no_survey", text))
+        return laid_out(network_to_json(clicked_network(_sizes(desk), survey, marks))).encode()
     return exported(name, marks, _sizes(desk), _range(desk), system)
 
 

@@ -1,6 +1,6 @@
-"""Orients cameras by the balls that a person clicked, and by nothing else (paper, step 2, alternative 1)."""
+"""Balls that a person clicked: cameras oriented by them alone (paper, step 2, alternative 1), and as a network."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -9,11 +9,11 @@ import numpy as np
 from analysis.cameras.source import Source
 from analysis.digitizing.marks.effective import sigma_of
 from analysis.digitizing.marks.journal import Entered, Key
-from analysis.digitizing.marks.things import ball_of
+from analysis.digitizing.marks.things import LANDMARK, ball_of
 from analysis.scene.camera_system import CameraSystem, camera_system
 from analysis.scene.survey import Survey
 from photogrammetry.network.file import pixel_to_metric
-from photogrammetry.network.model import Image, ImageObservations
+from photogrammetry.network.model import Image, ImageObservations, Network, Point, Role
 from photogrammetry.procedures.orientation import orient
 from rig.api.digitizing import MarkState
 from rig.errors import BadInputError
@@ -81,15 +81,7 @@ def orient_by_clicks(
         )
     seen = sorted({ball for name in used for ball in clicked[name]}, key=names.__getitem__)
     rows = [(i, seen.index(ball), entered) for i, name in enumerate(used) for ball, entered in clicked[name].items()]
-    size = np.array([sizes[used[i]] for i, _, _ in rows], float)
-    xy = np.array([entered.xy for _, _, entered in rows], float)
-    observations = ImageObservations(
-        np.array([i for i, _, _ in rows], np.intp),
-        np.array([p for _, p, _ in rows], np.intp),
-        np.stack([pixel_to_metric(place, s) for place, s in zip(xy, size, strict=True)]),
-        np.array([sigma_of(entered) for _, _, entered in rows], float),
-        np.zeros(len(rows), np.intp),
-    )
+    observations = _observations(rows, [sizes[name] for name in used])
     chosen = replace(
         network,
         cameras=tuple(placed[name] for name in used),
@@ -101,3 +93,55 @@ def orient_by_clicks(
     )
     orientation = orient(chosen, uncertain_interior=True)
     return camera_system(orientation, tuple(sizes)), list(orientation.notes)
+
+
+def clicked_network(
+    sizes: Mapping[str, tuple[int, int]], survey: Survey, marks: Iterable[tuple[Key, Entered]]
+) -> Network:
+    """The clicked balls and landmarks of all pulses as a network, with an image for each camera at each pulse.
+
+    Of pictures of a frame of targets `svev calibrate` makes the interior orientations from it (paper, step 1).
+
+    Args:
+        sizes: width and height of the images by camera, px.
+        survey: of the balls, or of the frame's targets; has the cameras.
+        marks: of a person. Landmarks that are none of its points are tie points.
+    """
+    placed, _ = survey.cameras_of(sizes)
+    cameras, points = list(placed), list(survey.network.points)
+    names = {point.name: i for i, point in enumerate(points)}
+    images: dict[tuple[str, int], int] = {}
+    rows = []
+    for key, entered in marks:
+        name = ball_of(key.thing) or (key.thing.removeprefix(LANDMARK) if key.thing.startswith(LANDMARK) else None)
+        if name is None or key.camera not in placed or entered.state is not MarkState.MEASURED or not entered.xy:
+            continue
+        if name not in names:
+            names[name] = len(points)
+            points.append(Point(name, Role.TIE))
+        image = images.setdefault((key.camera, key.pulse), len(images))
+        rows.append((image, names[name], entered))
+    return replace(
+        survey.network,
+        cameras=tuple(placed.values()),
+        images=tuple(Image(f"{name} pulse {pulse}", cameras.index(name)) for name, pulse in images),
+        points=tuple(points),
+        observations=_observations(rows, [sizes[name] for name, _ in images]),
+    )
+
+
+def _observations(rows: Sequence[tuple[int, int, Entered]], sizes: Sequence[tuple[int, int]]) -> ImageObservations:
+    """Marks as observations.
+
+    Args:
+        rows: image, point and mark.
+        sizes: of each image, px.
+    """
+    xy = [pixel_to_metric(np.array(entered.xy, float), np.array(sizes[i], float)) for i, _, entered in rows]
+    return ImageObservations(
+        np.array([i for i, _, _ in rows], np.intp),
+        np.array([p for _, p, _ in rows], np.intp),
+        np.array(xy, float).reshape(-1, 2),
+        np.array([sigma_of(entered) for _, _, entered in rows], float).reshape(-1, 2),
+        np.zeros(len(rows), np.intp),
+    )

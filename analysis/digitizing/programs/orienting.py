@@ -103,7 +103,12 @@ class Orienting:
     @property
     def balls(self) -> KnownPoints | None:
         """The surveyed balls; None: no survey."""
-        return self._given.surveyed() if isinstance(self._given, Survey) else None
+        return None if self.survey is None else self.survey.surveyed()
+
+    @property
+    def survey(self) -> Survey | None:
+        """The survey; None: there is none."""
+        return self._given if isinstance(self._given, Survey) else None
 
     def close(self) -> None:
         """End what is being done."""

@@ -12,6 +12,7 @@ export const digitizing = {
   hand_lacking: ["ikke orientert: {cameras}"],
   hand_or_click: ["{why}; eller klikk fire eller flere baller i hvert bilde, og orienter etter dem"],
   hand_poses_given: ["kameraenes plassering er oppgitt: oppgi innmålingen av ballene for å orientere etter klikkede baller"],
+  hand_no_survey: ["et nettverk inneholder kameraene og punktene i en innmåling: oppgi den med --survey"],
   hand_few_balls: ["et bilde trenger {fewest} klikkede baller eller flere, fem for å være sikker; det meste er {most}"],
   hand_no_space: ["ingenting kan regnes ut i rommet: {why}"],
   hand_not_oriented: ["kameraene er ikke orientert: {why}"],

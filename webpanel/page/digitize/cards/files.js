@@ -12,7 +12,7 @@ import { titleOf } from "./things.js";
 
 /** What is read, by the ending of its name; anything else is taken for measurements.json. @type {Record<string, string>} */
 const TYPES = { csv: "text/csv", zip: "application/zip" };
-const FILES = ["measurements.json", "marks.csv", "dltdv.zip", "argus.zip"];
+const FILES = ["measurements.json", "network.json", "marks.csv", "dltdv.zip", "argus.zip"];
 
 export function startFiles() {
   $("import-choose").addEventListener("click", () => $("import-file").click());

@@ -38,7 +38,8 @@ def test_three_cameras_are_recorded_unmixed_and_their_spread_is_told(
     assert result["alarms"] == []
     assert result["complete"] > result["pulses"] / 2
     assert result["causes"]["lost"] == 0
-    assert {len(pulses) for pulses in hill_pulses(Path(result["log"]), load_rig(path)).values()} == {1}
+    shown = [len(pulses) for pulses in hill_pulses(Path(result["log"]), load_rig(path)).values()]
+    assert max(shown) == 1, "frames of one exposure; of none where no camera was told in time"
     assert "trigger software trigger, frames of a pulse lie up to" in said
 
 

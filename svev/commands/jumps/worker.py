@@ -1,6 +1,7 @@
 """`svev worker`: measures the jumper from published triplets, live or replayed."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -68,9 +69,9 @@ def worker_command(
         socket.linger = _LINGER_MS
         address = bind(socket, bind_to)
         findings = _Published(socket, out, aside=as_json)
-        with LiveAnalysis(survey, calibration, findings) as analysis:
+        with LiveAnalysis(survey, calibration, findings) as analysis, counted_endings() as asks:
             console.say(f"triplets from {connect}, results at {address}; end with Ctrl-C", aside=True)
-            _work(analysis, source, idle)
+            _work(analysis, source, idle, asks)
     summary = {"pulses": analysis.pulses, "states": findings.states, "jumps": analysis.jumps}
     if not reliable:  # of a reliable replay, other workers may have the pulses between ours
         summary["missed"] = analysis.missed
@@ -80,9 +81,9 @@ def worker_command(
         console.say(", ".join(f"{count} {name}" for name, count in summary.items()))
 
 
-def _work(analysis: LiveAnalysis, source: Source, idle_s: float | None) -> None:
+def _work(analysis: LiveAnalysis, source: Source, idle_s: float | None, asks: Callable[[], int]) -> None:
     """Take triplets until told to end, or until nothing has come for so long."""
-    with counted_endings() as asks, connected(source) as stream:
+    with connected(source) as stream:
         quiet_s = 0.0
         while not asks() and (idle_s is None or quiet_s < idle_s):
             received = stream.next(_POLL_S)

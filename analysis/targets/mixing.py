@@ -12,6 +12,7 @@ from photogrammetry.network.diagnosis import NotConvergedError
 from photogrammetry.network.model import Camera, Network
 from photogrammetry.network.selection import RAYS, sub_network
 from rig.errors import BadInputError
+from rig.phrase import phrase
 
 #: Residuals that are so many times their sigmas ask for another explanation than measuring errors ...
 _DOUBTFUL: Final = 2.0
@@ -40,10 +41,14 @@ def of_one_lens(network: Network) -> tuple[Network, list[str]]:
         camera, odd, (c, other) = found
         if len(odd) > 1:
             names = ", ".join(network.images[k].name for k in odd)
+            text = (
+                "camera {camera}: pictures of two lenses: c is {other} px in {pictures}, and {c} px in the others: "
+                "zoom or focus was changed in between, or pictures of another camera are among them; put the pictures "
+                "of each lens into a folder of its own"
+            )
+            name = network.cameras[camera].name
             raise BadInputError(
-                f"camera {network.cameras[camera].name}: pictures of two lenses: c is {other:.0f} px in {names}, and "
-                f"{c:.0f} px in the others: zoom or focus was changed in between, or pictures of another camera are "
-                "among them; put the pictures of each lens into a folder of its own"
+                phrase("why_two_lenses", text, camera=name, other=round(other), pictures=names, c=round(c))
             )
         notes.append(
             f"{network.images[odd[0]].name} is left out: it contradicts all others: zoom or focus was another one, it "

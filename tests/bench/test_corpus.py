@@ -34,9 +34,9 @@ def test_scenes_are_of_many_kinds_and_none_is_too_large() -> None:
 
 @pytest.mark.long
 def test_a_scene_is_rendered_measured_and_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["--scenes", "1", "--pixels", str(_FEW), "--workers", "1", "--results", str(tmp_path)]
+    asked = ["--scenes", "1", "--first", "1", "--pixels", str(_FEW), "--workers", "1", "--results", str(tmp_path)]
     main([*asked, "--cache", str(tmp_path / "rows")])
-    (kept,) = (tmp_path / "rows").glob("*/work-0.json")
+    (kept,) = (tmp_path / "rows").glob("*/work-1.json")
     row = msgspec.json.decode(kept.read_bytes(), type=Row)
     assert row.error == ""
     assert 0 < row.solved <= row.points

@@ -215,7 +215,7 @@ def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str, s
 def _add_results(router: APIRouter, opened: Callable[[str], Desk], base: str) -> None:
     AtDesk = Annotated[Desk, Depends(opened)]  # noqa: N806 - a type
 
-    @router.get(base + "/export/{name}", response_class=Response, responses=_FILE | refusals(404))
+    @router.get(base + "/export/{name}", response_class=Response, responses=_FILE | refusals(404, 409))
     async def export_marks(desk: AtDesk, operator: Operator, name: Exported) -> Response:
         """The marks as a file: measurements, a network of clicked balls, a table, or the folder of DLTdv or Argus."""
         content = await run_sync(_delivered, desk, operator, name)

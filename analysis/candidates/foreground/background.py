@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammainc
 
 from analysis.candidates.median import median
 from analysis.scene.static_image import GreyImage, StaticImage
@@ -34,6 +35,7 @@ _SMALLEST = 12  # px; 15 radii of the smallest marker that can be measured: a ju
 _SPECK = 8  # pixels of the border of the smallest marker that can be measured
 _REACH = 0.7  # of the length of the largest part of a body that stands out: other parts are not farther from it
 _DARKEST = 0.1  # of the light of the static scene, below which an image shows nothing of it
+_COINCIDENCE = 0.1  # probability of so many specks about a body by chance, below which they belong to it
 _THINNEST = 3  # px; nothing real is thinner at its thickest, but a row of pixels that hold a number is
 _JOIN = 9  # px: what is nearer to each other belongs together
 _MARGIN = 10  # px around what moves
@@ -325,7 +327,8 @@ def _boxes(front: NDArray[np.uint8], within: tuple[int, int, int, int]) -> list[
             boxes.append((*wide, cv2.countNonZero(front[y : y + h, x : x + w])))
         else:
             specks.append(wide)
-    boxes = [_with_specks(box, specks) for box in boxes]
+    looked_at = (right - left) * (bottom - top)
+    boxes = [_with_specks(box, specks, looked_at) for box in boxes]
     rows, columns = front.shape
     grown = sorted(_joined(boxes), key=lambda box: -box[4])[:_MOST]
     spare = _MARGIN - _JOIN
@@ -336,15 +339,20 @@ def _boxes(front: NDArray[np.uint8], within: tuple[int, int, int, int]) -> list[
 
 
 def _with_specks(
-    box: tuple[int, int, int, int, int], specks: list[tuple[int, int, int, int]]
+    box: tuple[int, int, int, int, int], specks: list[tuple[int, int, int, int]], looked_at: int
 ) -> tuple[int, int, int, int, int]:
     """A box with the specks about it: of a body as dark as what is behind it only the markers may stand out.
 
-    No part of a body is farther from the largest one than this is long, or nearly.
+    No part of a body is farther from the largest one than this is long, or nearly. Where it snows, specks are
+    everywhere: they belong to a body only if so many are hardly there by chance. `looked_at` is how many pixels were
+    looked at.
     """
     reach = int(_REACH * max(box[2] - box[0], box[3] - box[1]))
     low, high = (box[0] - reach, box[1] - reach), (box[2] + reach, box[3] + reach)
     near = [of for of in specks if of[0] > low[0] and of[1] > low[1] and of[2] < high[0] and of[3] < high[1]]
+    expected = (len(specks) - len(near) + 1) * min(1.0, (high[0] - low[0]) * (high[1] - low[1]) / looked_at)
+    if not near or gammainc(len(near), expected) > _COINCIDENCE:  # so many or more, by the Poisson distribution
+        return box
     x, y, behind, below = zip(box[:4], *near, strict=True)
     return min(x), min(y), max(behind), max(below), box[4]
 

@@ -15,7 +15,7 @@ from analysis.measurements.file import read_measurements, write_measurements
 from analysis.measurements.model import Source
 from photogrammetry.network.file_writer import laid_out, network_to_json
 from rig.api.digitizing import Changed, MarkSource, MarkState
-from rig.errors import BadInputError
+from rig.errors import BadInputError, StateForbidsError
 from rig.phrase import phrase
 
 MEASUREMENTS: Final = "measurements.json"
@@ -33,6 +33,7 @@ def delivered(desk: Desk, operator: str, name: str) -> bytes:
 
     Raises:
         BadInputError: the marks do not go into such a file.
+        StateForbidsError: a network is asked for, and the log has no survey.
     """
     if name == MEASUREMENTS:
         return _measurements(desk, operator)
@@ -41,7 +42,7 @@ def delivered(desk: Desk, operator: str, name: str) -> bytes:
         survey = desk.programs.orienting.survey
         if survey is None:
             text = "a network holds the cameras and points of a survey: name it with --survey"
-            raise BadInputError(phrase("hand_no_survey", text))
+            raise StateForbidsError(phrase("hand_no_survey", text))
         return laid_out(network_to_json(clicked_network(_sizes(desk), survey, marks))).encode()
     return exported(name, marks, _sizes(desk), _range(desk), system)
 

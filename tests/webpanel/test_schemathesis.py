@@ -60,7 +60,9 @@ def test_the_whole_service_is_as_it_is_described(tmp_path: Path, loopback: Loopb
     with serving(tmp_path, write_rig(tmp_path, loopback, backend="sim"), loopback) as service:
         service.arm()
         for _ in range(2):
-            service.post("/api/recordings", {"duration_s": 0})
+            recording = service.post("/api/recordings", {"duration_s": 60})["id"]
+            service.await_pulses(3)  # of a log without any pulse nothing can be asked
+            service.post(f"/api/recordings/{recording}/stop")
             service.await_state("armed")
         schemathesis(service.url, tmp_path, "--phases=examples,fuzzing", "--max-examples=5")
         service.get("/api/status")

@@ -192,6 +192,10 @@ class _Run:
     def _end(self, name: str, future: Future[Any]) -> None:
         if future.status == "finished":
             self._hearer.done(name)
+        elif future.status == "pending":
+            self._names[future] = name  # its worker died with what it had returned, and Dask runs it again
+        elif future.status == "lost" and self._on.client.status == "running" and not self._last:
+            self._suspects.append(name)  # likewise, and Dask does not
         elif future.status != "error":
             raise _gone(f"a task is {future.status}")
         elif not isinstance(error := future.exception(timeout=_CONNECT_S), KilledWorker):

@@ -15,7 +15,7 @@ from photogrammetry.network.file import network_from_json
 from photogrammetry.network.file_writer import metric_to_pixel, network_to_json
 from photogrammetry.network.model import Point, Role
 from photogrammetry.procedures.calibration import calibrate
-from rig.errors import BadInputError
+from rig.errors import StateForbidsError
 from tests.analysis.digitizing.hill import opened
 from tests.photogrammetry.synthetic import SIZE, empty_observations, lab_frame
 
@@ -50,7 +50,7 @@ def test_targets_that_were_clicked_calibrate_the_cameras() -> None:
 
 def test_a_network_of_clicked_balls_has_the_survey_and_needs_one(jump: HillLog) -> None:
     without = opened(jump, survey=False)
-    with pytest.raises(BadInputError, match="name it with --survey"):
+    with pytest.raises(StateForbidsError, match="name it with --survey"):
         delivered(without, "Anna", "network.json")
     without.close()
     desk, place = opened(jump), Entered(xy=(100.5, 99.25), sigma=(0.2, 0.2))

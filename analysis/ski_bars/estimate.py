@@ -106,13 +106,13 @@ class BarFit:
             model_error: m there; None: it is not known, so it is estimated near the minimum first.
         """
         if model_error is None:
-            x, _ = self._minimum(x, _MODEL, _NEAR)
-            model_error = self._model_error(x)
-        x, cost = self._minimum(x, model_error, _ENOUGH)
-        return Estimate(x, cost, self._model_error(x))
+            x, seen, _ = self._minimum(x, _MODEL, _NEAR)
+            model_error = self._model_error(x, seen)
+        x, seen, cost = self._minimum(x, model_error, _ENOUGH)
+        return Estimate(x, cost, self._model_error(x, seen))
 
-    def _minimum(self, x: Floats, m: float, enough: float) -> tuple[Floats, float]:
-        """Unknowns at the minimum, and the cost there; `enough`, of a standard deviation, is a step that ends it."""
+    def _minimum(self, x: Floats, m: float, enough: float) -> tuple[Floats, Predicted, float]:
+        """Unknowns at the minimum, what they show, and the cost; a step of `enough` standard deviations ends it."""
         damping = _DAMPED
         seen = self.model.predicted(self.pixels, x)
         fitted = self.fitted(x, seen)
@@ -134,7 +134,7 @@ class BarFit:
                 x, seen, damping, cost = x + step, tried, damping / 10, less
             if small:
                 break
-        return x, cost
+        return x, seen, cost
 
     def _from_mean(self, x: Floats) -> Floats:
         return np.asarray(x - self.mean)
@@ -175,8 +175,7 @@ class BarFit:
         nearest = np.abs(seen.u).argmin(axis=0)
         return np.asarray(self.used[self.pixels.camera, nearest] & ~hidden_by_boots(self.model, x, self.pixels))
 
-    def _model_error(self, x: Floats) -> float:
-        seen = self.model.predicted(self.pixels, x, derivatives=False)
+    def _model_error(self, x: Floats, seen: Predicted) -> float:
         near = ((np.abs(seen.u) < seen.half + _BESIDE_PX) & (seen.s < SHOVEL_M)).any(axis=0) & self.fitted(x, seen)
         near &= (seen.cover > _COVERED).any(axis=0)
         if not near.any():

@@ -138,7 +138,7 @@ class BarModel:
         half = np.exp(x[at.width]).T[:, c] * feet.scale
         tail, tip = ((feet.s - shape[:, end, None]) * feet.px_per_m for end in (1, 2))
         edges = np.stack((feet.u + half, feet.u - half, tail, tip)) / blur
-        (p_left, p_right, p_tail, p_tip), (left, right, behind_tail, behind_tip) = normal(edges)
+        (p_left, p_right, p_tail, p_tip), (left, right, behind_tail, behind_tip) = _normal(edges)
         across, along = left - right, behind_tail - behind_tip
         cover = across * along
         absent = [k for k in range(SKIS) if not self.present[k]]
@@ -242,7 +242,7 @@ def _derivatives(camera: PlacedCamera, places: Floats) -> Floats:
     return camera.linearised(places.reshape(-1, 3), px.reshape(-1, 2))[1].reshape(*places.shape[:-1], 2, 3)
 
 
-def normal(value: Floats) -> tuple[Floats, Floats]:
+def _normal(value: Floats) -> tuple[Floats, Floats]:
     """Density and distribution function of the normal distribution, the latter within 1e-7.
 
     Abramowitz and Stegun, Handbook of Mathematical Functions, 26.2.17: faster than that of SciPy by far.

@@ -16,10 +16,11 @@ from analysis.candidates.model import SecondLook
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Part, predict
 from analysis.identification.over_time.window import Window
+from analysis.identification.space.body import usual_difference
 from analysis.identification.space.views import Views, gate
-from analysis.measurements.model import SIDES, SkiMeasurement
+from analysis.measurements.model import POINTS, SIDES, SkiMeasurement
 from analysis.ski_bars.bars import OF_POSE, SKIS, USUAL_SHAPE, USUAL_SHAPE_SIGMA, ExpectedBars, Poses
-from analysis.ski_bars.directions import OPENING, seek_directions
+from analysis.ski_bars.directions import OPENING, SHARP_M, is_sharp, seek_directions
 from analysis.ski_bars.fitting import FittedBars, fit_bars
 from analysis.ski_bars.pixels import SkiView
 from photogrammetry.jumper.stick_model import by_slope_and_heading, slope_and_heading
@@ -28,7 +29,8 @@ from rig.arrays import Flags, Floats
 #: Skis by side in each camera of a pulse.
 MeasuredSkis = Mapping[str, Mapping[str, SkiMeasurement]]
 
-_KNOWN_M: Final = 0.1  #: standard deviation of the place of a binding from which its ski is sought
+_VAGUE_M: Final = 0.2  #: standard deviation of the place of a binding from which its ski is sought through all pulses
+BINDINGS: Final = ("P3", "P4")
 _FEWEST: Final = 2  #: images that show a binding
 SOUGHT_RAD: Final = np.radians(2.0)  #: standard deviation of a direction that was sought
 _BINDING_M: Final = 0.06  #: of a binding's marker from the axis of its ski, in any direction
@@ -62,6 +64,21 @@ class Bindings:
         """At one pulse."""
         return Bindings(self.xyz[t], self.covariance[t])
 
+    def side_by_side(self, axes: Floats) -> "Bindings":
+        """The same (t, 2, 3); one that is not known lies beside the other one, as feet do.
+
+        Args:
+            axes: (3, 3) forward, left and up as rows.
+        """
+        mean, sigma = usual_difference(*(POINTS.index(label) for label in BINDINGS))
+        apart, spread = mean @ axes, (axes.T * sigma**2) @ axes
+        xyz, covariance, sharp = self.xyz.copy(), self.covariance.copy(), is_sharp(self.covariance)
+        for k in range(SKIS):
+            vague = ~sharp[:, k] & sharp[:, 1 - k]
+            xyz[vague, k] = self.xyz[vague, 1 - k] + (apart if k else -apart)
+            covariance[vague, k] = self.covariance[vague, 1 - k] + spread
+        return Bindings(xyz, covariance)
+
 
 def measure_skis(
     views: Views, window: Window, flight: Flight, bindings: Bindings, look: SecondLook, steps: Flags
@@ -80,10 +97,16 @@ def measure_skis(
         Of each pulse.
     """
     pulses = [ski_views(views, window, flight, t, look) if steps[t] else [] for t in range(len(window))]
-    known = np.array([sought_from(of, bindings.at(t)) for t, of in enumerate(pulses)])
+    bindings = bindings.side_by_side(flight.axes)
+    known, sharp = (
+        np.array([sought_from(of, bindings.at(t), sigma_m) for t, of in enumerate(pulses)])
+        for sigma_m in (_VAGUE_M, SHARP_M)
+    )
+    # What is seen from a vague place alone may be the other ski.
+    known &= sharp.any(axis=1, keepdims=True)
     if not known.any():
         return [{} for _ in pulses]
-    sought = seek_directions(pulses, bindings.xyz, known, window.time_s, flight.axes)
+    sought = seek_directions(pulses, bindings.xyz, bindings.covariance, known, window.time_s, flight.axes)
     pair = SkiPair()
     turning = np.tile(SOUGHT_RAD**2 * np.eye(2), (SKIS, 1, 1))
 
@@ -91,7 +114,7 @@ def measure_skis(
         return pair.fitted(pulses[t], bindings.at(t), sought.direction[t], turning, known[t])
 
     telling = [int(t) for t in np.argsort(-sought.gain.sum(axis=1))[:_TELLING] if known[t].any()]
-    pair.learn([(fitted(t), bindings.xyz[t]) for t in telling])
+    pair.learn([(fitted(t), bindings.at(t)) for t in telling])
     found = [fitted(t) if known[t].any() else None for t in range(len(window))]
     seen = np.array([(False, False) if fit is None else fit.seen for fit in found])
     seen = _smooth(seen, found, window.time_s, flight)
@@ -109,9 +132,9 @@ def ski_views(views: Views, window: Window, flight: Flight, t: int, look: Second
     ]
 
 
-def sought_from(views: Sequence[SkiView], bindings: Bindings) -> Flags:
-    """Of which skis (2,) a binding is known so well, and shown by so many cameras, that they can be sought."""
-    known = np.linalg.eigvalsh(bindings.covariance)[:, -1] < _KNOWN_M**2
+def sought_from(views: Sequence[SkiView], bindings: Bindings, sigma_m: float = SHARP_M) -> Flags:
+    """Of which skis (2,) a binding is known better than `sigma_m`, and shown by enough cameras to seek it."""
+    known = np.linalg.eigvalsh(bindings.covariance)[:, -1] < sigma_m**2
     count = np.zeros(SKIS)
     for view in views:
         px = view.camera.project(bindings.xyz + view.shift)
@@ -149,14 +172,17 @@ class SkiPair:
         expected = ExpectedBars(Poses(point, direction), covariance, self._shape, self._shape_sigma)
         return fit_bars(views, expected, (bool(known[0]), bool(known[1])), near=True)
 
-    def learn(self, seen: Sequence[tuple[FittedBars, Floats]]) -> None:
-        """Learn from some pulses: skis as fitted, and places (2, 3) of the markers of their bindings."""
+    def learn(self, seen: Sequence[tuple[FittedBars, Bindings]]) -> None:
+        """Learn from some pulses: skis as fitted, and the places (2,) of the markers of their bindings."""
         for k in range(SKIS):
-            own = [(fit, xyz[k]) for fit, xyz in seen if fit.seen[k]]
+            own = [(fit, at) for fit, at in seen if fit.seen[k]]
             if len(own) < _FEWEST_TELLING:
                 continue
             self._shape[k], self._shape_sigma[k] = np.median([fit.shape[k] for fit, _ in own], axis=0), _SHAPE_M
-            off = [_frames(fit.poses.direction)[k] @ (fit.poses.point[k] - xyz) for fit, xyz in own]
+            marked = [(fit, at.xyz[k]) for fit, at in own if is_sharp(at.covariance[k])]
+            if len(marked) < _FEWEST_TELLING:
+                continue
+            off = [_frames(fit.poses.direction)[k] @ (fit.poses.point[k] - xyz) for fit, xyz in marked]
             self._offset[k], self._offset_sigma[k] = np.median(off, axis=0), _STEADY_M
 
 

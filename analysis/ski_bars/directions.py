@@ -22,7 +22,7 @@ import numpy as np
 
 from analysis.ski_bars.bars import SKIS, USUAL_SHAPE
 from analysis.ski_bars.model import BOOT_M, SHOVEL_M
-from analysis.ski_bars.pixels import SkiView
+from analysis.ski_bars.pixels import SkiView, to_piece
 from rig.arrays import Flags, Floats, Integers
 
 #: Slope and heading of a ski against the flight, rad, standard deviations, and how far from it they are sought.
@@ -34,9 +34,12 @@ _COARSE, _FINE = np.radians(4.0), np.radians(1.0)
 _AROUND: Final = 5  # fine steps to each side of the coarse direction
 _TURNS: Final = 0.6  # of the steps of the directions: those of the lines in an image
 _SLOPE_RAD_S, _HEADING_RAD_S = 1.5, 0.6  # how fast skis turn
-#: Lines are tried up to so far beside a binding, in such steps; and what is so far from a line is beside the ski, m.
-_ASIDE_M, _STEP_M, _BESIDE_M = 0.09, 0.03, 0.09
-_ASIDE_SIGMA_M: Final = 0.05
+#: Lines are tried up to so many standard deviations beside a binding, in such steps; and what is so far from a line is
+#: beside the ski, m.
+_ASIDE_SIGMAS, _STEP_M, _BESIDE_M = 1.8, 0.03, 0.09
+_ASIDE_SIGMA_M: Final = 0.05  # of the axis from a binding's marker, across it
+SHARP_M: Final = 0.1  #: standard deviation of a binding from which on it is known vaguely alone
+_TAKEN_M, _TAKEN_PX = 0.05, 2.0  # half the width of what another ski explains: itself, and the blur
 _REACH_M: Final = (-1.28, 1.52)
 _ALONG_M: Final = 0.08
 _ALIKE_PX: Final = 8.0  # along a ski, over which errors of the model are alike
@@ -60,17 +63,25 @@ class Directions:
 
 
 def seek_directions(
-    pulses: Sequence[Sequence[SkiView]], bindings: Floats, known: Flags, time_s: Floats, axes: Floats
+    pulses: Sequence[Sequence[SkiView]],
+    bindings: Floats,
+    covariance: Floats,
+    known: Flags,
+    time_s: Floats,
+    axes: Floats,
 ) -> Directions:
     """Seek the directions of both skis.
 
     Args:
         pulses: what the cameras show at t pulses.
         bindings: (t, 2, 3) m.
-        known: (t, 2) where a binding is known.
+        covariance: (t, 2, 3, 3) of them, m^2. One that is vague is sought beside the ski of the other one: what shows
+            that ski tells nothing of it.
+        known: (t, 2) where a binding is known, perhaps vaguely.
         time_s: (t,) of the pulses.
         axes: (3, 3) forward, left and up as rows.
     """
+    sharp = known & is_sharp(covariance)
     slope, heading = (
         np.arange(-round(_SOUGHT_SIGMAS * sigma / _COARSE), round(_SOUGHT_SIGMAS * sigma / _COARSE) + 1) * _COARSE
         for sigma in (SLOPE_SIGMA, HEADING_SIGMA)
@@ -79,19 +90,37 @@ def seek_directions(
     around = np.arange(-_AROUND, _AROUND + 1) * _FINE
     beside = -0.5 * (np.hypot(around[:, None], around) / _COARSE) ** 2
     coarse = directions(slope, heading, axes)
-    scores = np.zeros((SKIS, len(pulses), len(slope), len(heading)))
-    for k, t in zip(*np.nonzero(known.T), strict=True):
-        scores[k, t] = prior + _scores(pulses[t], bindings[t, k], coarse, _COARSE)
-    paths = _both(scores, known, time_s, slope, heading)
     direction, gain = np.zeros((len(pulses), SKIS, 3)), np.zeros((len(pulses), SKIS))
-    for k, t in zip(*np.nonzero(known.T), strict=True):
-        fine = directions(slope[paths[k, t, 0]] + around, heading[paths[k, t, 1]] + around, axes)
-        score = _scores(pulses[t], bindings[t, k], fine, _FINE)
-        gain[t, k] = score.max()
-        weight = np.exp(score - gain[t, k] + beside)
-        mean = np.array([(weight * part).sum() for part in np.meshgrid(around, around, indexing="ij")]) / weight.sum()
-        direction[t, k] = directions(slope[paths[k, t, :1]] + mean[0], heading[paths[k, t, 1:]] + mean[1], axes)[0, 0]
+    scores = np.zeros((SKIS, len(pulses), len(slope), len(heading)))
+    paths = np.zeros((SKIS, len(pulses), 2), int)
+
+    def place(t: int, k: int) -> _Place:
+        other = 1 - k
+        explained = sharp[t, other] and not sharp[t, k]
+        taken = (bindings[t, other], direction[t, other]) if explained else None
+        return _Place(pulses[t], bindings[t, k], covariance[t, k], taken)
+
+    for wanted in (sharp, known & ~sharp):
+        if not wanted.any():
+            continue
+        for k, t in zip(*np.nonzero(wanted.T), strict=True):
+            scores[k, t] = prior + place(t, k).scores(coarse, _COARSE)
+        paths = _both(scores, sharp | wanted, time_s, slope, heading)
+        for k, t in zip(*np.nonzero(wanted.T), strict=True):
+            fine = directions(slope[paths[k, t, 0]] + around, heading[paths[k, t, 1]] + around, axes)
+            score = place(t, k).scores(fine, _FINE)
+            gain[t, k] = score.max()
+            weight = np.exp(score - gain[t, k] + beside)
+            steps = np.meshgrid(around, around, indexing="ij")
+            mean = np.array([(weight * part).sum() for part in steps]) / weight.sum()
+            turned = slope[paths[k, t, :1]] + mean[0], heading[paths[k, t, 1:]] + mean[1]
+            direction[t, k] = directions(*turned, axes)[0, 0]
     return Directions(direction, gain)
+
+
+def is_sharp(covariance: Floats) -> Flags:
+    """Whether places with covariances (..., 3, 3) are known so well that lines are sought there alone."""
+    return np.asarray(np.linalg.eigvalsh(covariance)[..., -1] < SHARP_M**2)
 
 
 def _both(scores: Floats, known: Flags, time_s: Floats, slope: Floats, heading: Floats) -> Integers:
@@ -141,54 +170,92 @@ def _likeliest(scores: Floats, time_s: Floats, slope: Floats, heading: Floats) -
     return path[::-1], float(best.max())
 
 
-def _scores(views: Sequence[SkiView], binding: Floats, directions: Floats, step: float) -> Floats:
-    """How much likelier than no ski each direction (s, h, 3) is, by all images, natural logarithm (s, h)."""
-    total = np.zeros(directions.shape[:2])
-    ends = np.array(USUAL_SHAPE[1:])
-    for view in views:
-        place = binding + view.shift
-        xy = view.camera.project(place)
-        px = view.camera.project(place + ends[:, None, None, None] * directions)
-        scale = float(view.camera.camera.interior[0] / np.linalg.norm(place - view.camera.position))
-        if not (np.isfinite(px).all() and np.isfinite(xy).all()):
-            continue
-        chord = px[1] - px[0]
-        turn = np.arctan2(chord[..., 1], chord[..., 0])
-        middle = np.angle(np.exp(2j * turn).sum()) / 2
-        # a line looks the same from both ends
-        off = (turn - middle + np.pi / 2) % np.pi - np.pi / 2
-        turns = np.arange(off.min(), off.max() + _TURNS * step, _TURNS * step)
-        lines = _line_sums(view, xy, scale, middle + turns, min(_STEP_M, step))
-        if lines is None:
-            continue
-        sums, aside = lines
-        i = np.clip(np.rint((off - turns[0]) / (_TURNS * step)).astype(int), 0, len(turns) - 1)
-        unit = np.stack((np.cos(middle + off), np.sin(middle + off)), axis=-1)
-        reach = np.sort(((px - xy) * unit).sum(axis=-1) / scale, axis=0)
-        first, last = (np.clip(np.rint((r - _REACH_M[0]) / _ALONG_M).astype(int), 0, sums.shape[2] - 1) for r in reach)
-        total += (sums[i, :, last] - sums[i, :, first] + aside).max(axis=-1)
-    return total
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Where a binding is.
+
+    Attributes:
+        views: images of the pulse.
+        xyz: (3,) m.
+        covariance: (3, 3) m^2.
+        taken: place (3,) and direction (3,) of the other ski, where that explains what is seen.
+    """
+
+    views: Sequence[SkiView]
+    xyz: Floats
+    covariance: Floats
+    taken: tuple[Floats, Floats] | None
+
+    def scores(self, directions: Floats, step: float) -> Floats:
+        """How much likelier than no ski directions (s, h, 3), `step` apart, are by all images: logarithms (s, h)."""
+        total = np.zeros(directions.shape[:2])
+        ends = np.array(USUAL_SHAPE[1:])
+        vague = 0.0 if is_sharp(self.covariance) else float(np.linalg.eigvalsh(self.covariance)[-1])
+        sigma_m = float(np.sqrt(_ASIDE_SIGMA_M**2 + vague))
+        for view in self.views:
+            place = self.xyz + view.shift
+            xy = view.camera.project(place)
+            px = view.camera.project(place + ends[:, None, None, None] * directions)
+            scale = float(view.camera.camera.interior[0] / np.linalg.norm(place - view.camera.position))
+            if not (np.isfinite(px).all() and np.isfinite(xy).all()):
+                continue
+            chord = px[1] - px[0]
+            turn = np.arctan2(chord[..., 1], chord[..., 0])
+            middle = np.angle(np.exp(2j * turn).sum()) / 2
+            # a line looks the same from both ends
+            off = (turn - middle + np.pi / 2) % np.pi - np.pi / 2
+            turns = np.arange(off.min(), off.max() + _TURNS * step, _TURNS * step)
+            lines = _line_sums(view, _Bundle(xy, scale, middle + turns, min(_STEP_M, step), sigma_m), self.taken)
+            if lines is None:
+                continue
+            sums, aside = lines
+            i = np.clip(np.rint((off - turns[0]) / (_TURNS * step)).astype(int), 0, len(turns) - 1)
+            unit = np.stack((np.cos(middle + off), np.sin(middle + off)), axis=-1)
+            reach = np.sort(((px - xy) * unit).sum(axis=-1) / scale, axis=0)
+            first, last = (
+                np.clip(np.rint((r - _REACH_M[0]) / _ALONG_M).astype(int), 0, sums.shape[2] - 1) for r in reach
+            )
+            total += (sums[i, :, last] - sums[i, :, first] + aside).max(axis=-1)
+        return total
 
 
-def _line_sums(view: SkiView, xy: Floats, scale: float, turns: Floats, step_m: float) -> tuple[Floats, Floats] | None:
-    """Sums along lines around a binding, from their first sample to each; None outside of the image.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Bundle:
+    """Lines of an image through a binding, and beside it.
 
-    Args:
-        view: of a camera.
+    Attributes:
         xy: (2,) the binding, px.
         scale: px per m.
         turns: (n,) of the lines against the x axis, rad.
         step_m: between lines side by side.
+        sigma_m: how far beside the binding the axis may be, standard deviation.
+    """
+
+    xy: Floats
+    scale: float
+    turns: Floats
+    step_m: float
+    sigma_m: float
+
+
+def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | None) -> tuple[Floats, Floats] | None:
+    """Sums along lines around a binding, from their first sample to each; None outside of the image.
+
+    Args:
+        view: of a camera.
+        lines: that are looked at.
+        taken: as of `_Place`.
 
     Returns:
         Sums (n, lines side by side, samples + 1), and the logarithm of the density of lines beside the binding.
     """
-    reach = int(np.ceil(max(_REACH_M) * scale + (_ASIDE_M + _BESIDE_M) * scale)) + 2
+    xy, scale, turns, step_m = lines.xy, lines.scale, lines.turns, lines.step_m
+    side, beside = round(_ASIDE_SIGMAS * lines.sigma_m / step_m), round(_BESIDE_M / step_m)
+    reach = int(np.ceil((max(_REACH_M) + (side + beside) * step_m) * scale)) + 2
     region = view.part(np.floor(xy).astype(int) - reach, np.ceil(xy).astype(int) + reach + 1)
     if region is None:
         return None
-    side, beside = round(_ASIDE_M / step_m), round(_BESIDE_M / step_m)
-    u = np.arange(-side - beside, side + beside + 1) * float(step_m * scale)
+    u = np.asarray(np.arange(-side - beside, side + beside + 1) * step_m * scale, float)
     r = np.arange(_REACH_M[0], _REACH_M[1], _ALONG_M)
     on, shape = slice(beside, beside + 2 * side + 1), (len(turns), len(u), len(r))
     cosine, sine = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]
@@ -199,18 +266,24 @@ def _line_sums(view: SkiView, xy: Floats, scale: float, turns: Floats, step_m: f
         for layer in (region.grey, region.behind, region.sigma)
     )
     inside = (x >= 0) & (x <= region.grey.shape[1] - 1) & (y >= 0) & (y <= region.grey.shape[0] - 1)
+    inside = inside.reshape(shape)
+    if taken is not None:
+        ends = taken[0] + np.array(USUAL_SHAPE[1:])[:, None] * taken[1] + view.shift
+        places = np.stack((x + region.x, y + region.y), axis=-1).reshape(-1, 2)
+        away = to_piece(places.astype(float), view.camera.project(ends)).reshape(shape)
+        inside &= away > _TAKEN_M * scale + _TAKEN_PX
     variance = sigma**2
     scene = _density(grey - behind, variance)
     nothing = np.log(0.5 * scene + 0.5 * _ANYTHING)
-    free = np.log(_FREE * scene + (1 - _FREE) * _ANYTHING) - nothing
+    free = np.where(inside, np.log(_FREE * scene + (1 - _FREE) * _ANYTHING) - nothing, 0.0)
     arms = (np.abs(r) > BOOT_M) & (np.abs(r) < SHOVEL_M)
     bright = np.median(grey[:, on][..., arms], axis=-1, keepdims=True)
     misfit = variance[:, on] + (_MODEL * (bright - behind[:, on])) ** 2 + _ROUGH**2
     ski = np.log(_ON_SKI * _density(grey[:, on] - bright, misfit) + _THROUGH * scene[:, on] + _COVERED * _ANYTHING)
     gain = ski - nothing[:, on] + 0.5 * (free[:, : 2 * side + 1] + free[:, 2 * beside :])
-    gain[~inside.reshape(shape)[:, on] | (np.abs(r) < BOOT_M)] = 0.0
+    gain[~inside[:, on] | (np.abs(r) < BOOT_M)] = 0.0
     alike = min(1.0, _ALONG_M * scale / _ALIKE_PX)
-    aside = np.asarray(-0.5 * (u[on] / (_ASIDE_SIGMA_M * scale)) ** 2, float)
+    aside = np.asarray(-0.5 * (u[on] / (lines.sigma_m * scale)) ** 2, float)
     return np.concatenate((np.zeros((*gain.shape[:2], 1)), alike * np.cumsum(gain, axis=-1)), axis=-1), aside
 
 

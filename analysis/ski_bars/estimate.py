@@ -46,11 +46,13 @@ class Estimate:
 
     Attributes:
         x: unknowns, as `model.Unknowns` orders them.
+        seen: what they show, with its derivatives.
         cost: half the robust sum of squares, with that of the expectation.
         model_error: m.
     """
 
     x: Floats
+    seen: Predicted
     cost: float
     model_error: float
 
@@ -109,7 +111,7 @@ class BarFit:
             x, seen, _ = self._minimum(x, _MODEL, _NEAR)
             model_error = self._model_error(x, seen)
         x, seen, cost = self._minimum(x, model_error, _ENOUGH)
-        return Estimate(x, cost, self._model_error(x, seen))
+        return Estimate(x, seen, cost, self._model_error(x, seen))
 
     def _minimum(self, x: Floats, m: float, enough: float) -> tuple[Floats, Predicted, float]:
         """Unknowns at the minimum, what they show, and the cost; a step of `enough` standard deviations ends it."""
@@ -187,8 +189,7 @@ class BarFit:
 
     def covariance(self, found: Estimate) -> Floats:
         """Covariance of the unknowns: the sandwich of normal equations and covariance of the pixels."""
-        x, m = found.x, found.model_error
-        seen = self.model.predicted(self.pixels, x)
+        x, seen, m = found.x, found.seen, found.model_error
         fitted = self.fitted(x, seen)
         normal, by_noise, by_model = self.sandwich(x, seen, seen.by_unknowns, fitted, m)
         inverse = np.linalg.inv(normal + self.prior)

@@ -53,9 +53,8 @@ class ImageLine:
 
 def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
     """The lines of both skis in each image; None where an image does not show a ski."""
-    x, m = found.x, found.model_error
+    x, seen, m = found.x, found.seen, found.model_error
     model, at = fit.model, fit.model.unknowns
-    seen = model.predicted(fit.pixels, x)
     fitted = fit.fitted(x, seen)
     off = fit.pixels.grey - seen.grey
     weight, robust = fit.weights(x, seen, fitted, m), fit.robust(x, seen, m)

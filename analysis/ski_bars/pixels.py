@@ -96,7 +96,7 @@ def _cells(region: Region, px: Floats, k: int, reach: float, camera: int) -> tup
     xy = (px[k, 0] + t[:, None, None] * along + u[:, None] * np.array((-along[1], along[0]))).reshape(-1, 2)
     last = np.array(region.grey.shape[::-1]) - 1
     within = xy - (region.x, region.y)
-    xy = xy[((within >= 1) & (within <= last - 1)).all(axis=1) & (_distance(xy, px[k]) <= _distance(xy, px[1 - k]))]
+    xy = xy[((within >= 1) & (within <= last - 1)).all(axis=1) & (to_piece(xy, px[k]) <= to_piece(xy, px[1 - k]))]
     if not len(xy):
         return np.zeros(0), xy, *np.zeros((3, 0))
     steps = np.arange(CELL_PX) - (CELL_PX - 1) / 2
@@ -109,7 +109,7 @@ def _cells(region: Region, px: Floats, k: int, reach: float, camera: int) -> tup
     return np.full(len(xy), camera), xy, grey.astype(float), behind.astype(float), noise
 
 
-def _distance(xy: Floats, ends: Floats) -> Floats:
+def to_piece(xy: Floats, ends: Floats) -> Floats:
     """From places (n, 2) to the straight piece between two ends (2, 2), px."""
     step = ends[1] - ends[0]
     t = np.clip((xy - ends[0]) @ step / max(float(step @ step), 1e-9), 0, 1)

@@ -35,8 +35,8 @@ class FollowedSkis:
 
     def __init__(self) -> None:
         self._pair = SkiPair()
-        self._seen: deque[tuple[FittedBars, Floats]] = deque(maxlen=_RECENT)
-        self._moments: deque[tuple[float, Sequence[SkiView], Floats, Flags]] = deque(maxlen=_MOMENTS)
+        self._seen: deque[tuple[FittedBars, Bindings]] = deque(maxlen=_RECENT)
+        self._moments: deque[tuple[float, Sequence[SkiView], Bindings, Flags]] = deque(maxlen=_MOMENTS)
 
     def measured(
         self, time_s: float, views: Sequence[SkiView], bindings: Bindings, angles: Prediction, axes: Floats
@@ -51,7 +51,7 @@ class FollowedSkis:
             axes: (3, 3) of that frame.
         """
         known = sought_from(views, bindings)
-        self._moments.append((time_s, views, bindings.xyz, known))
+        self._moments.append((time_s, views, bindings, known))
         if not known.any():
             return {}
         sure = np.linalg.eigvalsh(angles.covariance[0])[:, -1] < _PREDICTED_RAD**2
@@ -61,7 +61,8 @@ class FollowedSkis:
         turning = by_angles @ angles.covariance[0] @ by_angles.swapaxes(1, 2)
         if (unsure := known & ~sure).any():
             times, pulses, places, there = zip(*self._moments, strict=True)
-            sought = seek_directions(pulses, np.array(places), np.array(there), np.array(times), axes)
+            xyz, covariance = (np.array(part) for part in zip(*((at.xyz, at.covariance) for at in places), strict=True))
+            sought = seek_directions(pulses, xyz, covariance, np.array(there), np.array(times), axes)
             direction[unsure], turning[unsure] = sought.direction[-1][unsure], SOUGHT_RAD**2 * np.eye(2)
         fit = self._pair.fitted(views, bindings, direction, turning, known)
         turned = Poses(bindings.xyz, direction).step_to(fit.poses)[:, 3:]
@@ -70,6 +71,6 @@ class FollowedSkis:
         if len(self._moments) < _MOMENTS:
             seen &= sure  # what was sought in one or two pulses alone may be anything
         fit = replace(fit, seen=(bool(seen[0]), bool(seen[1])))  # what contradicts tells nothing of the shape either
-        self._seen.append((fit, bindings.xyz))
+        self._seen.append((fit, bindings))
         self._pair.learn(self._seen)
         return measured(fit, seen)

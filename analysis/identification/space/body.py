@@ -48,10 +48,25 @@ def implausibility(one: int, other: int, difference: Floats) -> Floats:
     names = POINTS[one], POINTS[other]
     if names not in _DIFFERENCES:
         return implausibility(other, one, -difference)
-    mean, sigma = (np.array(values) for values in _DIFFERENCES[names])
+    mean, sigma = usual_difference(one, other)
     length, spread = _DISTANCES[names]
     apart = (np.linalg.norm(difference, axis=1) - length) / spread
     return np.asarray((((difference - mean) / sigma) ** 2).sum(axis=1) + apart**2)
+
+
+def usual_difference(one: int, other: int) -> tuple[Floats, Floats]:
+    """Mean and standard deviation (3,) of the difference other - one of two points, m, in the frame of the flight.
+
+    Args:
+        one: index into `POINTS`.
+        other: likewise.
+    """
+    names = POINTS[one], POINTS[other]
+    if names not in _DIFFERENCES:
+        mean, sigma = usual_difference(other, one)
+        return -mean, sigma
+    mean, sigma = (np.array(values) for values in _DIFFERENCES[names])
+    return mean, sigma
 
 
 def log_spread(one: int, other: int) -> float:

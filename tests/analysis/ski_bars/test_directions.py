@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from analysis.candidates.foreground.background import Background
+from analysis.identification.markers.markers import ANYWHERE_M
+from analysis.identification.ski_bars import Bindings
 from analysis.scene.static_image import StaticImage
 from analysis.ski_bars.directions import Directions, seek_directions
 from analysis.ski_bars.pixels import SkiView
@@ -23,7 +25,8 @@ def of(request: pytest.FixtureRequest) -> TrackedHill:
     return hill(request.param)
 
 
-def _sought(of: TrackedHill, pulses: list[int], *, empty: bool = False) -> Directions:
+def _sought(of: TrackedHill, pulses: list[int], *, empty: bool = False, bare: bool = False) -> Directions:
+    """Of some pulses; `empty`: in images without a jumper, `bare`: the left binding wears no marker."""
     backgrounds = {}
     for name in NAMES:
         grey = np.median([of.frames(p)[name] for p in (30, 31, 78, 79)], axis=0).astype(np.float32)
@@ -39,7 +42,11 @@ def _sought(of: TrackedHill, pulses: list[int], *, empty: bool = False) -> Direc
     bindings = np.array([[of.truth[p]["points"][label] for label in ("P3", "P4")] for p in pulses])
     bindings = bindings + rng.normal(0, BINDING_M, bindings.shape)
     known = np.ones((len(pulses), 2), bool)
-    return seek_directions(views, bindings, known, np.array(pulses) / RATE_HZ, AXES)
+    covariance = np.tile(BINDING_M**2 * np.eye(3), (len(pulses), 2, 1, 1))
+    if bare:
+        bindings[:, 1], covariance[:, 1] = np.nan, ANYWHERE_M**2 * np.eye(3)
+    places = Bindings(bindings, covariance).side_by_side(AXES)
+    return seek_directions(views, places.xyz, places.covariance, known, np.array(pulses) / RATE_HZ, AXES)
 
 
 def _off_deg(of: TrackedHill, pulses: list[int], found: Directions) -> Floats:
@@ -60,3 +67,11 @@ def test_directions_are_found_to_some_degrees(of: TrackedHill) -> None:
 def test_where_there_is_no_ski_less_speaks_for_one(of: TrackedHill) -> None:
     pulses = of.in_sight("P3")[::4]
     assert _sought(of, pulses).gain.mean() > 2 * _sought(of, pulses, empty=True).gain.mean()
+
+
+def test_a_ski_without_a_marker_is_found_beside_the_other_one(of: TrackedHill) -> None:
+    pulses = of.in_sight("P3")[::2]
+    found = _sought(of, pulses, bare=True)
+    off = _off_deg(of, pulses, found)
+    assert np.median(off[:, 1]) < 6.0
+    assert np.quantile(off[:, 1], 0.9) < 12.0, "twice as far as with its marker; a fit finds most from there"

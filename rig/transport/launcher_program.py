@@ -1,5 +1,6 @@
 """The program of the launcher: imports modules and forks children that run them. It never has a second thread."""
 
+import atexit
 import ctypes
 import gc
 import importlib
@@ -7,9 +8,10 @@ import json
 import os
 import socket
 import sys
+import threading
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 import msgspec
 
@@ -20,6 +22,8 @@ _REQUEST_BYTES: Final = 1 << 16
 _MOST_DESCRIPTORS: Final = 253  # SCM_MAX_FD of the kernel
 #: Fields of /proc/PID/stat (proc(5)), counted from the one after the program's name.
 _ARG_START, _ARG_END = 45, 46
+#: Python's exit code where standard output or error cannot be written at the end.
+_NOT_WRITTEN: Final = 120
 
 
 def main() -> None:
@@ -33,7 +37,32 @@ def main() -> None:
             launch = _serve(asking)
         asking = _fork_launcher(launch) if launch is not None and launch.launches else None
     if launch is not None:
-        sys.exit(importlib.import_module(launch.module).main())
+        _run(launch.module)
+    os._exit(0)
+
+
+def _run(module: str) -> NoReturn:
+    """Run a program to its end, but leave its memory to the kernel.
+
+    Python would take apart every module on the way out, and so copy all that this process shares with the launcher.
+    What has to be done at the end is done: threads are awaited, what was registered is called, outputs are written.
+    """
+    try:
+        code = importlib.import_module(module).main()
+    except SystemExit as end:
+        code = end.code
+    if code is not None and not isinstance(code, int):
+        sys.stderr.write(f"{code}\n")
+        code = 1
+    threading._shutdown()  # type: ignore[attr-defined] # as multiprocessing does at the end of a fork
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            try:
+                stream.flush()
+            except (OSError, ValueError):  # nobody takes it, or it is closed
+                code = code or _NOT_WRITTEN
+    os._exit((code or 0) & 0xFF)
 
 
 def _fork_launcher(launch: Launch) -> socket.socket | None:

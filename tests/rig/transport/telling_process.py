@@ -1,8 +1,10 @@
 """A program that tells what it is, or ends in the way that its argument names."""
 
+import atexit
 import os
 import signal
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -17,6 +19,19 @@ def _is_open(number: int) -> bool:
     except OSError:
         return False
     return True
+
+
+def _leave() -> None:
+    """End with a thread that still runs, something registered, and what is not written yet."""
+
+    def go_on() -> None:
+        threading.main_thread().join()
+        _say("the thread has ended")
+
+    atexit.register(_say, "what was registered")
+    threading.Thread(target=go_on).start()
+    _say("main has ended")
+    sys.exit("a text instead of a code")
 
 
 def main() -> None:
@@ -42,6 +57,10 @@ def main() -> None:
             )
         case "ends":
             sys.exit(7)
+        case "ends well":
+            sys.stdout.write("well")  # and it is not written yet
+        case "leaves":
+            _leave()
         case "fails":
             _say(1 // 0)
         case "killed":

@@ -69,6 +69,20 @@ def test_its_end_is_known_by_its_code(more: dict[str, str], tmp_path: Path, what
     process.kill()  # nobody is there any more, and nothing happens
 
 
+def test_at_its_end_nothing_is_left_undone(more: dict[str, str], tmp_path: Path) -> None:
+    """Threads are awaited, what was registered is called, and what was said is written."""
+    process = _start("leaves", more, tmp_path / "out")
+    assert process.wait(20) == 1
+    said = (tmp_path / "out").read_text().splitlines()
+    said.remove("a text instead of a code")
+    assert said == ["main has ended", "the thread has ended", "what was registered"]
+
+
+def test_an_output_that_nobody_takes_is_no_success(more: dict[str, str]) -> None:
+    process = _start("ends well", more, Path("/dev/full"))
+    assert process.wait(20) in {1, 120}  # 120: at the very end, since Python had kept it until then
+
+
 def test_it_has_the_descriptors_that_it_inherits_and_no_other(more: dict[str, str], tmp_path: Path) -> None:
     told, tell = os.pipe()
     with (tmp_path / "not inherited").open("wb"):

@@ -1,6 +1,6 @@
 """Finds the back end that a rig file names for a camera; imports what drives a camera only if a camera needs it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Final
 
@@ -65,6 +65,10 @@ _DRIVERS: Final[dict[Backend, str]] = {
     "aravis": "capture.aravis.camera", "iidc": "capture.iidc.camera", "sim": "capture.sim.camera",
     "replay": "capture.replay.camera",
 }  # fmt: skip
+#: What draws the simulated hill for a back end.
+_SIMULATORS: Final[dict[Backend, str]] = {
+    "aravis": "simrig.programs.gige_camera", "iidc": "simrig.programs.firewire_bus", "sim": "simrig.programs.scene",
+}  # fmt: skip
 _BACKENDS: Final[dict[Backend, _Opener]] = {"aravis": _aravis, "iidc": _iidc, "sim": _sim, "replay": _replay}
 
 
@@ -93,10 +97,13 @@ def check_backends(rig: RigSettings) -> None:
 def prepare_programs(rig: RigSettings) -> None:
     """Have the programs of a rig's processes imported in good time, so that arming does not wait for it."""
     backends = {camera.backend for camera in rig.cameras}
-    modules = [_PROGRAMS + "recorder", _PROGRAMS + "grabber", *(_DRIVERS[backend] for backend in sorted(backends))]
-    if rig.simulation is not None and "aravis" in backends:
-        modules.insert(0, "simrig.programs.gige_camera")
-    launcher().prepare(*modules)
+    launcher().prepare(*programs_of(sorted(backends), simulated=rig.simulation is not None))
+
+
+def programs_of(backends: Sequence[Backend], *, simulated: bool) -> list[str]:
+    """The modules that processes of such a rig run, in the order in which they are started."""
+    simulators = [_SIMULATORS[backend] for backend in backends if backend in _SIMULATORS] if simulated else []
+    return [*simulators, _PROGRAMS + "recorder", _PROGRAMS + "grabber", *(_DRIVERS[each] for each in backends)]
 
 
 def camera_opener(rig: RigSettings, index: int, ring: CameraRing, epoch: HostNs) -> OpenCamera:

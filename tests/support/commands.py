@@ -8,10 +8,13 @@ from types import TracebackType
 from typing import BinaryIO, Self
 
 from rig.transport.launcher import Process, launcher, start_program
+from service.processes.backends import programs_of
 from svev.cli import _COMMANDS
 
 #: Commands that start programs.
 _LAUNCHING = ("record", "serve", "rehearse", "demo", "bench")
+#: What their processes run.
+_OF_RIGS = programs_of(("aravis", "iidc", "sim", "replay"), simulated=True)
 _ENDS_S = 10.0
 
 
@@ -91,8 +94,9 @@ def launch_svev(
         environment: variables that it has beside ours.
     """
     command = arguments[0] if arguments else ""
-    if command in _COMMANDS:
-        launcher().prepare(f"svev.commands.{_COMMANDS[command][0]}")  # once: the next one has it from its birth
+    if command in _COMMANDS:  # once: the next one has it from its birth, and so has the launcher of a service
+        programs = _OF_RIGS if command in _LAUNCHING else ()
+        launcher().prepare(f"svev.commands.{_COMMANDS[command][0]}", *programs)
     return start_program(
         "svev.__main__",
         arguments,

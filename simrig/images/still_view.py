@@ -90,5 +90,6 @@ def _with_noise(clean: NDArray[np.float32], sigma: float, rng: np.random.Generat
 
 def _quantized(grey: NDArray[np.float32], bits: int) -> Stored:
     """Whole numbers of so many bits from grey levels of eight bits."""
-    values: NDArray[np.float32] = np.clip(np.rint(grey * np.float32(2.0 ** (bits - 8))), 0, (1 << bits) - 1)
+    values = grey * np.float32(2.0 ** (bits - 8))
+    np.clip(np.rint(values, out=values), 0, (1 << bits) - 1, out=values)
     return values.astype(np.uint8) if bits == 8 else values.astype(np.uint16)

@@ -1,11 +1,12 @@
 """Renders what never moves (sky, forest, snow, take-off table, poles of the balls), once per camera."""
 
 import math
+from collections.abc import Iterable
 from itertools import pairwise
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rig.arrays import Floats
 from simrig.images.scene.balls import put_poles
@@ -47,12 +48,8 @@ class _Painter:
     def paint_land_and_forest(self) -> None:
         (land, snow), (trees, needles) = self._land(), self._trees()
         far = np.concatenate([self._projection.distance(land).mean(axis=1), self._projection.distance(trees[:, 0])])
-        places = [*self._places(land), *self._places(trees)]
-        greys = np.concatenate([snow, needles])
-        for index in np.argsort(-far, kind="stable"):
-            corners = places[index]
-            if corners is not None:
-                self.canvas.polygon(corners, float(greys[index]))
+        polygons = [*zip((*self._places(land), *self._places(trees)), (*snow.tolist(), *needles.tolist()), strict=True)]
+        self._fill(polygons[index] for index in np.argsort(-far, kind="stable"))
 
     def paint_table(self) -> None:
         """The take-off table: a wedge of boards with two tracks and a dark line at the edge."""
@@ -60,17 +57,21 @@ class _Painter:
         xs = np.linspace(_TABLE_END_M, 0.0, 16)
         spans = [(a, b, float(self._hill.table(a)), float(self._hill.table(b))) for a, b in pairwise(xs)]
         near = -half if self._projection.X0[1] < 0 else half
+        boards: list[tuple[list[tuple[float, float, float]], float]] = []
         for a, b, za, zb in spans:
-            self._fill([(a, near, za), (b, near, zb), (b, near, foot), (a, near, foot)], 98.0)
-            self._fill([(a, near, za), (b, near, zb), (b, near, zb - 0.3), (a, near, za - 0.3)], 60.0)
+            boards.append(([(a, near, za), (b, near, zb), (b, near, foot), (a, near, foot)], 98.0))
+            boards.append(([(a, near, za), (b, near, zb), (b, near, zb - 0.3), (a, near, za - 0.3)], 60.0))
         if self._projection.X0[0] > 0:
-            self._fill([(0, -half, 0), (0, half, 0), (0, half, foot), (0, -half, foot)], 78.0)
-            self._fill([(0, -half, 0), (0, half, 0), (0, half, -0.12), (0, -half, -0.12)], 45.0)
+            boards.append(([(0, -half, 0), (0, half, 0), (0, half, foot), (0, -half, foot)], 78.0))
+            boards.append(([(0, -half, 0), (0, half, 0), (0, half, -0.12), (0, -half, -0.12)], 45.0))
         if self._projection.X0[2] > float(self._hill.table(self._projection.X0[0])):
             for a, b, za, zb in spans:
-                self._fill([(a, -half, za), (b, -half, zb), (b, half, zb), (a, half, za)], 168.0)
+                boards.append(([(a, -half, za), (b, -half, zb), (b, half, zb), (a, half, za)], 168.0))
                 for y in (-0.17, 0.17):
-                    self._fill([(a, y - 0.06, za), (b, y - 0.06, zb), (b, y + 0.06, zb), (a, y + 0.06, za)], 128.0)
+                    track = [(a, y - 0.06, za), (b, y - 0.06, zb), (b, y + 0.06, zb), (a, y + 0.06, za)]
+                    boards.append((track, 128.0))
+        places = self._places(np.array([corners for corners, _ in boards]))
+        self._fill(zip(places, (grey for _, grey in boards), strict=True))
 
     def _land(self) -> tuple[Floats, Floats]:
         """Quads of snow: groomed knoll, softer snow beside it that rises towards the forest.
@@ -118,21 +119,22 @@ class _Painter:
             greys += [grey, grey + 34]
         return np.stack(triangles, axis=1).reshape(-1, 3, 3), np.stack(greys, axis=1).ravel()
 
-    def _places(self, polygons: Floats) -> list[Floats | None]:
-        """Corners in px of those polygons, shape (n, k, 3), that are in front of the camera and in its image."""
+    def _places(self, polygons: Floats) -> list[NDArray[np.int32] | None]:
+        """Where polygons, corners in m, shape (n, k, 3), are on the canvas; None: not in the image or too near."""
         near = self._projection.distance(polygons).min(axis=1) > _NEAREST_M
-        places: list[Floats | None] = [None] * len(polygons)
         pixels = self._projection.pixels(polygons[near])
         size = self._projection.width, self._projection.height
         inside = (pixels.max(axis=1) >= -1).all(axis=1) & (pixels.min(axis=1) <= size).all(axis=1)
-        for index, corners, seen in zip(np.flatnonzero(near), pixels, inside, strict=True):
-            places[index] = corners if seen else None
+        places: list[NDArray[np.int32] | None] = [None] * len(polygons)
+        for index, corners in zip(np.flatnonzero(near)[inside], self.canvas.on_grid(pixels[inside]), strict=True):
+            places[index] = corners
         return places
 
-    def _fill(self, corners: ArrayLike, grey: float) -> None:
-        for places in self._places(np.asarray(corners, float)[None]):
-            if places is not None:
-                self.canvas.polygon(places, grey)
+    def _fill(self, polygons: Iterable[tuple[NDArray[np.int32] | None, float]]) -> None:
+        """Fill polygons with their grey values, one over the other; corners as `_places` gives them."""
+        for corners, grey in polygons:
+            if corners is not None:
+                self.canvas.fill(corners, grey)
 
 
 def _sky(projection: Projection) -> NDArray[np.uint8]:

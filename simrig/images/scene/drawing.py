@@ -30,9 +30,17 @@ class Canvas:
 
     def polygon(self, corners: ArrayLike, grey: float) -> None:
         """Fill a convex polygon; `corners` in px, shape (n, 2)."""
-        fine = (np.asarray(corners, float) + 0.5) * _FINE - 0.5
-        places = np.rint(fine * (1 << _SHIFT)).astype(np.int32)
+        self.fill(self.on_grid(corners), grey)
+
+    def fill(self, places: NDArray[np.int32], grey: float) -> None:
+        """Fill a convex polygon with corners on the grid, shape (n, 2)."""
         cv2.fillConvexPoly(self._grid, places, round(grey), cv2.LINE_8, _SHIFT)
+
+    @staticmethod
+    def on_grid(corners: ArrayLike) -> NDArray[np.int32]:
+        """Where corners, px, are on the canvas' grid; shape (..., 2)."""
+        fine = (np.asarray(corners, float) + 0.5) * _FINE - 0.5
+        return np.rint(fine * (1 << _SHIFT)).astype(np.int32)
 
     def image(self) -> Image:
         """The drawing in pixels, shape (h, w)."""
@@ -108,7 +116,7 @@ def _blurred_disc(radii: Floats, disc: float, sigma: float) -> Floats:
     """Radial profile of a disc convolved with a Gaussian: quadrature over the chords of the disc."""
     nodes, weights = _quadrature()
     u = disc * nodes
-    chord = np.array([math.erf(math.sqrt(disc**2 - v**2) / (math.sqrt(2) * sigma)) for v in u])
+    chord = np.array([math.erf(half) for half in (np.sqrt(disc**2 - u**2) / (math.sqrt(2) * sigma)).tolist()])
     line = np.exp(-((radii[:, None] - u) ** 2) / (2 * sigma**2)) / (math.sqrt(2 * math.pi) * sigma)
     return np.asarray(line @ (chord * weights * disc))
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from tests.season.files import campaign_file, log_file
+from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -46,10 +47,7 @@ def test_a_task_that_kills_two_workers_is_set_aside_and_no_other_is_accused(tmp_
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, loopback: Loopback) -> None:
     log_file(tmp_path / "hill" / "a.mcap")
     address = f"tcp://{loopback.host}:{loopback.free_port()}"
-    command = ["season", "run", str(campaign_file(tmp_path)), "--scheduler", address]
-    done = subprocess.run(
-        [sys.executable, "-m", "svev", *command], capture_output=True, text=True, timeout=60, check=False
-    )
+    done = run_svev("season", "run", str(campaign_file(tmp_path)), "--scheduler", address)
     assert done.returncode == 2
     assert f"{address}: no Dask scheduler answers there" in done.stderr
 

@@ -1,8 +1,6 @@
 """Athletes, days and hills at once, against the effects that a season was drawn with."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +10,15 @@ from season.running.logs import find_logs
 from season.tables.database import build, opened
 from season.tables.mixed_effects import TooLittleError, mixed_effects
 from tests.season.drawn import ATHLETE, DAY, JUMP, SIGMA, draw_season
+from tests.support.commands import run_svev
 
 
 def test_effects_are_those_that_were_drawn(tmp_path: Path) -> None:
     season = draw_season(tmp_path, jumps=400, athletes=12, days=12)
     season.campaign.out.mkdir()
     build(season.campaign, find_logs(season.campaign))
-    command = [sys.executable, "-m", "svev", "season", "compare", "--in", str(season.file)]
-    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=120, check=True)
+    done = run_svev("season", "compare", "--in", str(season.file), "--json", timeout_s=120)
+    assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     middle = float(np.mean(list(season.effects.values())))
     off = [

@@ -18,6 +18,7 @@ from season.tables.database import DATABASE, asked, build, opened
 from season.tables.questions import QUESTIONS
 from svev.commands.jumps.season_tables import aligned, group_rows
 from tests.season.drawn import Drawn, draw_season
+from tests.support.commands import run_svev
 
 DOCS = Path(__file__).parents[2] / "docs" / "how-to" / "season.md"
 
@@ -124,14 +125,13 @@ def test_athletes_that_differ_are_marked(drawn: Drawn) -> None:
 
 
 def test_the_command_answers(drawn: Drawn) -> None:
-    command = [sys.executable, "-m", "svev", "season", "query", "--in", str(drawn.file)]
-    done = subprocess.run(
-        [*command, "SELECT hill, count(*) AS n, max(day) AS last FROM jumps GROUP BY ALL ORDER BY ALL", "--json"],
-        capture_output=True, text=True, timeout=60, check=True,
-    )  # fmt: skip
+    command = ("season", "query", "--in", str(drawn.file))
+    asked = "SELECT hill, count(*) AS n, max(day) AS last FROM jumps GROUP BY ALL ORDER BY ALL"
+    done = run_svev(*command, asked, "--json")
+    assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     assert answer["columns"] == ["hill", "n", "last"]
     assert [row[:2] for row in answer["rows"]] == [["Hill", 120], ["Other", 120]]
-    neither = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    neither = run_svev(*command)
     assert neither.returncode == 2
     assert "give either SQL or --ask" in neither.stderr

@@ -15,15 +15,15 @@ from rig.settings.file import CONFIG
 from simrig.world.scenario import load_scenario
 from svev.demo import _showing
 from svev.demo_analysis import measure
+from tests.support.commands import run_svev
 
 
 @pytest.mark.parametrize(
     "bus", ["gige", pytest.param("firewire", marks=pytest.mark.long), pytest.param("sim", marks=pytest.mark.long)]
 )
 def test_the_demo_records_publishes_verifies_and_shows(tmp_path: Path, bus: str) -> None:
-    options = ["--seconds", "4", "--bus", bus, "--out", str(tmp_path), "--no-analyze", "--json"]
-    command = [sys.executable, "-m", "svev", "demo", *options]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    options = ("--seconds", "4", "--bus", bus, "--out", str(tmp_path), "--no-analyze", "--json")
+    done = run_svev("demo", *options, timeout_s=120)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert result["pulses"] == result["complete"] + result["partial"] == 120

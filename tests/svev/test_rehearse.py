@@ -20,6 +20,7 @@ from svev.doctor.finding import Level
 from svev.rehearsal import Rehearsed, headroom_of, judge_pulses, judge_source
 from tests.capture.rigs import write_rig
 from tests.recorder.logs import ALL_OK, OK, write_log
+from tests.support.commands import start_svev
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -53,24 +54,21 @@ def test_a_rig_that_works_is_ready_and_the_disk_is_as_before(
     assert list(out.iterdir()) == []
 
 
-def _end_when_there_is(pattern: str, command: list[str], out: Path) -> None:
-    """Run the command, end it by SIGTERM when there is such a file in `out`: it says no verdict, and leaves nothing."""
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as rehearsing:
-        try:
-            wait_until(lambda: any(out.glob(pattern)), pattern, timeout_s=60)
-            rehearsing.send_signal(signal.SIGTERM)
-            said, complaint = rehearsing.communicate(timeout=30)
-        finally:
-            rehearsing.kill()
-    assert (rehearsing.returncode, said) == (130, b""), complaint
+def _end_when_there_is(pattern: str, rig: Path, out: Path, *more: str) -> None:
+    """Rehearse, end it by SIGTERM when there is such a file in `out`: it says no verdict, and leaves nothing."""
+    with start_svev("rehearse", "--rig", str(rig), "--out", str(out), "--json", *more) as rehearsing:
+        wait_until(lambda: any(out.glob(pattern)), pattern, timeout_s=60)
+        rehearsing.send_signal(signal.SIGTERM)
+        code = rehearsing.wait(30)
+        said, complaint = rehearsing.written()
+    assert (code, said) == (130, ""), complaint
     assert list(out.iterdir()) == []
 
 
 def test_one_that_is_interrupted_gives_no_verdict(tmp_path: Path, loopback: Loopback) -> None:
     out = tmp_path / "recordings"
     rig = write_rig(tmp_path, "sim", loopback)
-    command = [sys.executable, "-m", "svev", "rehearse", "--rig", str(rig), "--seconds", "60", "--out", str(out)]
-    _end_when_there_is(".rehearsal-*/*.mcap", [*command, "--json"], out)
+    _end_when_there_is(".rehearsal-*/*.mcap", rig, out, "--seconds", "60")
 
 
 def test_one_that_is_ended_before_its_recording_begins_leaves_nothing_behind(
@@ -79,8 +77,7 @@ def test_one_that_is_ended_before_its_recording_begins_leaves_nothing_behind(
     out = tmp_path / "recordings"
     rig = write_rig(tmp_path, "sim", loopback, scenario="pauses = [[0, 100000]]")
     rig.write_text(rig.read_text().replace("rate_hz = 30.0", "rate_hz = 30.0\nsettle_s = 60.0"))
-    command = [sys.executable, "-m", "svev", "rehearse", "--rig", str(rig), "--out", str(out), "--json"]
-    _end_when_there_is(".rehearsal-*", command, out)
+    _end_when_there_is(".rehearsal-*", rig, out)
 
 
 def test_what_is_wrong_is_named_with_what_to_do(

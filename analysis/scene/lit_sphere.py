@@ -10,7 +10,7 @@ integrated over points of the disc (Gauss and Legendre in the cosine between nor
 of which gives a Gaussian, the product of one along x and one along y.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -20,7 +20,7 @@ from rig.arrays import Floats
 LIGHT: Final = 5  #: unknowns of the light: A, H, S
 UNKNOWNS: Final = 10  #: of a ball: x, y; light; log of gain, blur and radius
 _SPACING = 1.3  # blurs between points of the disc: the outline is true to 1e-3
-_ROOT = float(np.sqrt(2 * np.pi))
+_TOGETHER = 8  # balls that are computed at a time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,6 +45,13 @@ class Spheres:
     area: Floats
     normals: Floats
 
+    def part(self, place: slice) -> "Spheres":
+        """Some of the balls."""
+        return replace(
+            self, corner=self.corner[place], background=self.background[place], to_image=self.to_image[place],
+            normals=self.normals[place],
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Light:
@@ -55,6 +62,10 @@ class Light:
     gain: Floats
     blur: Floats
     radius: float
+
+    def part(self, place: slice) -> "Light":
+        """That of some of the balls."""
+        return replace(self, xy=self.xy[place], gain=self.gain[place], blur=self.blur[place])
 
 
 def disc_points(radius_px: float, blur: float) -> tuple[Floats, Floats, Floats]:
@@ -86,41 +97,48 @@ def sphere_images(spheres: Spheres, at: Light, *, clipped: bool = True) -> tuple
     Returns:
         Grey values (n, w, w), derivatives (n, 10, w, w), and the share of each pixel that the ball covers (n, w, w).
     """
+    places = [slice(first, first + _TOGETHER) for first in range(0, len(spheres.corner) or 1, _TOGETHER)]
+    few = [_few_images(spheres.part(place), at.part(place), clipped=clipped) for place in places]
+    value, design, cover = (np.concatenate(each) for each in zip(*few, strict=True))
+    return value, design, cover
+
+
+def _few_images(spheres: Spheres, at: Light, *, clipped: bool) -> tuple[Floats, Floats, Floats]:
+    """As `sphere_images`, of so few balls that what is computed of them stays in the processor's cache."""
     n, w = len(spheres.corner), spheres.size
     gain, blur = at.gain[:, None, None], at.blur[:, None, None]
     off = at.radius * np.einsum("nij,kj->nik", spheres.to_image, spheres.points)
-    determinant = np.abs(np.linalg.det(spheres.to_image))
-    pixel = np.arange(w)
-    first = spheres.corner - at.xy
-    u, v = ((pixel + first[:, i, None])[:, :, None] - off[:, i, None] for i in (0, 1))
-    u /= blur
-    v /= blur
-    across, down = np.exp(-0.5 * u * u) / (_ROOT * blur), np.exp(-0.5 * v * v) / (_ROOT * blur)
+    away = (spheres.corner - at.xy)[:, :, None] + np.arange(w)  # of the pixels from the centre, columns and rows
+    u, v = (away[:, i, :, None] / blur - (off[:, i] / at.blur[:, None])[:, None] for i in (0, 1))
+    across, down = np.exp(-0.5 * u * u), np.exp(-0.5 * v * v)
     normals = spheres.normals
     along = normals @ at.light[2:]
     lit = (along > 0 if clipped else np.ones_like(along, bool)) * 1.0
     shade = at.light[0] + at.light[1] * normals[:, :, 2] + lit * along
-    area = (at.radius**2 * determinant[:, None]) * spheres.area
+    size = at.radius**2 * np.abs(np.linalg.det(spheres.to_image)) / (2 * np.pi * at.blur**2)
+    area = size[:, None] * spheres.area
     both = np.stack((area, area * shade), axis=1)  # what the outline and what the light weighs
-    channels = area[:, None] * np.concatenate(
-        (np.ones((n, 1, len(spheres.points))), normals[:, None, :, 2], (normals * lit[..., None]).transpose(0, 2, 1)),
-        axis=1,
-    )
+    lights = np.concatenate((normals[:, :, 2:], normals * lit[..., None]), axis=2).transpose(0, 2, 1) * area[:, None]
 
-    def summed(rows: Floats, weights: Floats, columns: Floats) -> Floats:
-        """Sums over the points: rows (n, w, k), weights (n, c, k), columns (n, w, k) to (n, c, w, w)."""
-        stacked = (weights[:, :, None] * rows[:, None]).reshape(n, -1, rows.shape[-1])
+    def weighed(rows: Floats, weights: Floats) -> Floats:
+        """Rows (n, w, k) with weights (n, c, k): (n, c, w, k)."""
+        return np.asarray(weights[:, :, None] * rows[:, None])
+
+    def summed(rows: Floats, columns: Floats) -> Floats:
+        """Sums over the points: rows (n, c, w, k), columns (n, w, k) to (n, c, w, w)."""
+        stacked = rows.reshape(n, -1, rows.shape[-1])
         return np.asarray((stacked @ columns.swapaxes(1, 2)).reshape(n, -1, w, w))
 
-    slope_u, slope_v = across * u / blur, down * v / blur  # by the place of the point
-    parts = summed(down, channels, across)
-    by_x, by_y = summed(down, both, slope_u), summed(slope_v, both, across)
-    by_blur = summed(down, both, across * (u * u - 1)) + summed(down * (v * v - 1), both, across)
-    moved = [both * off[:, i, None] for i in (0, 1)]
-    by_radius = summed(down, moved[0], slope_u) + summed(slope_v, moved[1], across)
-    cover = parts[:, 0]
-    light = np.einsum("c,ncij->nij", at.light, parts)
-    by_radius += 2 * np.stack((cover, light), axis=1)
+    upright, steep = weighed(down, both), down * v
+    outline_and_light = summed(upright, across)
+    parts = np.concatenate((outline_and_light[:, :1], summed(weighed(down, lights), across)), axis=1)
+    flat = across * u
+    by_x = summed(upright, flat) / blur[..., None]  # by the place of the point
+    by_y = summed(weighed(steep, both), across) / blur[..., None]
+    by_blur = summed(upright, flat * u) + summed(weighed(steep * v, both), across) - 2 * outline_and_light
+    # A larger ball is what is seen nearer and less blurred: the same sums, since off = away - blur * (u, v).
+    by_radius = away[:, 0, None, None] * by_x + away[:, 1, None, :, None] * by_y - by_blur
+    cover, light = outline_and_light[:, 0], outline_and_light[:, 1]
     value = spheres.background * (1 - cover) + gain * light
     design = np.empty((n, UNKNOWNS, w, w))
     for column, change in ((0, by_x), (1, by_y), (8, by_blur), (9, by_radius)):

@@ -200,8 +200,9 @@ def _equations(pixels: Strip, theta: Floats, weight: Floats, noise: float) -> _E
     prior = np.zeros(len(theta))
     prior[-1] = _BLUR_SPREAD**-2
     off = np.log(_BLUR) - theta[-1]
-    full = np.einsum("spi,spj,s->ij", design, design, w, optimize=True) + np.diag(prior + 1e-9)
-    gradient = np.einsum("spi,sp,s->i", design, v, w, optimize=True)
+    weighed = (design * w[:, None, None]).reshape(-1, len(theta)).T
+    full = weighed @ design.reshape(-1, len(theta)) + np.diag(prior + 1e-9)
+    gradient = weighed @ v.ravel()
     gradient[-1] += prior[-1] * off
     cost = float(weight @ squares) + prior[-1] * off**2
     counts = np.asarray(pixels.there.sum(axis=1), float)

@@ -44,9 +44,10 @@ corpus: setup ## the analysis on hills drawn at random, beside the truth and the
 test: setup $(NPM) ## all tests but the long ones
 	@tests/run $(WORKERS) "not long" $(ARGS)
 
+# Those marked `alone` wait for a program of one thread that everybody comes before: on two cores there is room for two.
 test-long: setup $(NPM) ## the tests that take long by nature: soak, every fault, statistics of sigmas, packaging
 	@tests/run $(WORKERS) "long and not alone" -o timeout=400 $(ARGS)
-	@tests/run 1 "long and alone" $(ARGS)
+	@tests/run 2 "long and alone" $(ARGS)
 
 check: style test ## format, lint, types, layers, tests; CI tries the wheel and runs the long tests as well
 

@@ -1,4 +1,8 @@
-"""`protocol.html` and `protocol.txt`: everything that a geodesist needs to judge a measured recording."""
+"""`protocol.html` and `protocol.txt`: everything that a geodesist needs to judge a measured recording.
+
+Nothing of the session stands in them. Names are corrected later, and only the files of `analysis.result.naming` are
+written anew then; what was noted about an athlete is for nobody who opens the link to his jump.
+"""
 
 import math
 from collections import Counter
@@ -78,8 +82,6 @@ def protocol(result: MeasuredRecording, measurements: Measurements, orientation:
 
 def _recording(result: MeasuredRecording) -> Iterable[Part]:
     yield f"recording {result.recording}, {result.rate_hz:g} pulses per second, {len(result.jumps)} jumps"
-    fields = [f"{key}: {value}" for key, value in result.session.items() if value.strip()]
-    yield "; ".join(fields) or "no fields of the session were filled in"
     yield (
         "lengths m, sigmas of lengths mm, angles and their sigmas degrees; sigmas are standard deviations and hold in "
         "the frame of the survey"

@@ -230,7 +230,7 @@ class Service(Archive):
     def restore_recording(self, recording_id: str) -> Recording:
         """Take a recording out of the trash."""
         entry = self._catalogue.restore(recording_id)
-        self._measurings.renamed(recording_id, self._catalogue.file(recording_id))
+        self._measurings.restored(recording_id, self._catalogue.file(recording_id))
         return self._with_next_part(entry)
 
     def preview(self, newer_than: RigPulse, timeout_s: float) -> Preview | None:

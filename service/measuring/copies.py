@@ -32,7 +32,7 @@ class Copies:
 
     def __init__(self, folder: Path, in_use: Callable[[], RigSettings], tell: Callable[[Event], None]) -> None:
         self._folder, self._in_use = folder, in_use
-        self.waiting = WaitingLogs(folder, tell)  # kept in no file: the notes tell what is copied
+        self.waiting = WaitingLogs()  # kept in no file: the notes tell what is copied
         self.notes = CopyNotes(folder, tell)
         self._looked: tuple[Path, float] | None = None
 

@@ -28,7 +28,7 @@ from service.measuring.after_steps import AfterSteps
 from service.measuring.copies import Copies
 from service.measuring.results import is_outdated, measurement_of
 from service.measuring.retries import Retries
-from service.measuring.waiting import WaitingLogs
+from service.measuring.waiting import QueueFile, WaitingLogs
 from service.offloading.releasing import Releasing, Removal
 
 _QUEUE_LOOK_S: Final = 0.2
@@ -73,12 +73,14 @@ class Measurings:
     ) -> None:
         self._folder, self._in_use, self._busy, self._changed = folder, in_use, busy, changed
         self._tell = tell
-        self._waiting = WaitingLogs(folder, tell)
-        self._names = WaitingLogs(folder, tell)  # results whose files say a corrected name: they tell so themselves
+        self._file = QueueFile(folder, tell)
+        self._waiting = WaitingLogs(self._file.keep)
+        self._names = WaitingLogs()  # results whose files say a corrected name: they tell so themselves
         self._copies = Copies(folder, in_use, tell)
         self._releasing = Releasing(folder, in_use, self._copies.notes, removal, tell)
         self._at = self._waiting  # what the log stands in that is at work
         self._retries = Retries(folder, in_use)
+        self._gone: set[str] = set()  # deleted before they were measured
         self._running: MeasuringQueue | None = None
         self._figures: tuple[LastJump, ...] = ()  # of what is running
         self._found = found
@@ -97,6 +99,7 @@ class Measurings:
         self._closed.set()
         self._bell.set()
         self._thread.join(_THREAD_ENDS_S)
+        self._file.wait(_THREAD_ENDS_S)
 
     def opened(self, log: Path) -> None:
         """Note that a recording writes this log; when it is closed that is done with it which the rig file asks for.
@@ -111,6 +114,15 @@ class Measurings:
                 self._waiting.add(log.stem, first=True)
         self._copies.want(log.stem)
         self._bell.set()
+
+    def restored(self, recording: str, log: Path) -> None:
+        """A recording is back from the trash: if it was deleted before its turn came, it waits again."""
+        if recording in self._gone:
+            self._gone.discard(recording)
+            with suppress(StateForbidsError):  # two thousand wait: this one is measured when somebody asks
+                self._waiting.add(recording)
+            self._bell.set()
+        self.renamed(recording, log)
 
     def renamed(self, recording: str, log: Path) -> None:
         """The session of a recording was corrected: the files of its result that name the jumper are written anew."""
@@ -197,14 +209,13 @@ class Measurings:
 
     def _run(self) -> None:
         self._after.tidy()
-        self._waiting.load()
+        self._waiting.go_on(self._file.read())
         for log in self._folder.glob("*.mcap"):
             self.renamed(log.stem, log)
         while not self._closed.is_set():
             self._retry()
             if not self._busy():
                 self._copies.look()
-            self._waiting.keep()
             if (recording := self._next(self._names)) is not None:
                 self._rename(recording)
             elif (recording := self._next(self._waiting)) is not None:
@@ -227,7 +238,7 @@ class Measurings:
                 queued.append(recording)
         if not queued:
             return
-        self._waiting.keep()
+        self._file.wait(_THREAD_ENDS_S)
         self._retries.queued(queued)
         text = "survey or poses have changed: {count} recordings that could not be measured by them are measured again"
         said = phrase("event_measured_again", text, count=len(queued))
@@ -241,10 +252,16 @@ class Measurings:
         for recording in waiting.ids:
             log = self._log(recording)
             if not log.exists():
-                waiting.remove(recording)
+                self._drop(recording, waiting)
             elif not is_being_written(log):
                 return recording
         return None
+
+    def _drop(self, recording: str, waiting: WaitingLogs) -> None:
+        """Let a log wait no more; one that was deleted before it was measured is remembered."""
+        if waiting is self._waiting and recording in waiting and not self._log(recording).exists():
+            self._gone.add(recording)
+        waiting.remove(recording)
 
     def _work(self, recording: str) -> None:
         """Measure a log, and take the further steps; a step that was cancelled or interrupted leaves no note."""
@@ -255,8 +272,7 @@ class Measurings:
                 self._retries.look_again()
             if not self._closed.is_set():
                 self._copies.want(recording)
-                self._waiting.remove(recording)
-                self._waiting.keep()
+                self._drop(recording, self._waiting)
 
     def _rename(self, recording: str) -> None:
         """Write what a result says of the session anew; a result of an older svev is measured again for that."""

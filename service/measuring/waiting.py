@@ -1,7 +1,8 @@
 """The logs that wait to be measured, in order; a file keeps them for a service that starts again."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -11,6 +12,7 @@ from rig.errors import StateForbidsError
 from rig.events import Event, Level
 from rig.host.disk import replace_file
 from rig.host.files import TEXT_MAX, read_whole
+from rig.host.latest import LatestWriter
 from rig.phrase import Phrase, phrase
 
 NAME: Final = ".svev-measuring.json"
@@ -18,8 +20,11 @@ _MOST_LOGS: Final = 2000
 _IDS: Final = TypeAdapter(list[str])
 
 
-class WaitingLogs:
-    """Ids of recordings. Any thread may call any method.
+class QueueFile:
+    """Keeps which logs wait.
+
+    It is written in a thread of its own as soon as that changes: measuring one log may take minutes, and the computer
+    may lose its power meanwhile.
 
     Args:
         folder: folder of the recordings.
@@ -28,8 +33,50 @@ class WaitingLogs:
 
     def __init__(self, folder: Path, tell: Callable[[Event], None]) -> None:
         self._file, self._tell = folder / NAME, tell
+        self._kept: list[str] | None = None  # None: not read yet, so nothing is written over it
+        self._writer = LatestWriter("measuring queue", self._lament)
+
+    def read(self) -> list[str]:
+        """The logs that waited in an earlier service. From now on the file is written."""
+        try:
+            self._kept = _IDS.validate_json(read_whole(self._file, TEXT_MAX, links=False))
+        except FileNotFoundError:
+            self._kept = []
+        except (OSError, ValidationError) as error:
+            self._kept = []
+            text = "{file}: cannot be read, so logs that waited to be measured are forgotten ({why})"
+            why = str(error).partition("\n")[0]
+            self._warn(phrase("event_no_queue", text, file=NAME, why=why))
+        return self._kept
+
+    def keep(self, ids: list[str]) -> None:
+        """Begin to write the logs that wait, if they are others than those in the file."""
+        if self._kept is not None and ids != self._kept:
+            self._kept = ids
+            self._writer.write(partial(replace_file, self._file, _IDS.dump_json(ids), links=False))
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until the file is written, or refused; False if that takes longer."""
+        return self._writer.wait(timeout_s)
+
+    def _lament(self, error: OSError) -> None:
+        text = "{file}: cannot be written ({why}): a service that starts again does not know what to measure"
+        self._warn(phrase("event_queue_not_kept", text, file=NAME, why=error.strerror or str(error)))
+
+    def _warn(self, said: Phrase) -> None:
+        self._tell(Event.now(Level.WARNING, "analysis", said))
+
+
+class WaitingLogs:
+    """Ids of recordings. Any thread may call any method.
+
+    Args:
+        changed: takes all of them after each change, one call after the other; it must not take long.
+    """
+
+    def __init__(self, changed: Callable[[list[str]], None] = lambda _: None) -> None:
+        self._changed = changed
         self._ids: list[str] = []
-        self._kept: list[str] | None = None
         self._lock = threading.Lock()
 
     def __contains__(self, recording: str) -> bool:
@@ -59,40 +106,18 @@ class WaitingLogs:
                     )
                 )
             self._ids.insert(0 if first else len(self._ids), recording)
+            self._changed(list(self._ids))
 
     def remove(self, recording: str) -> None:
         """Let a log wait no more."""
         with self._lock:
             if recording in self._ids:
                 self._ids.remove(recording)
+                self._changed(list(self._ids))
 
-    def load(self) -> None:
+    def go_on(self, before: Iterable[str]) -> None:
         """Append the logs that waited in an earlier service."""
-        try:
-            before = _IDS.validate_json(read_whole(self._file, TEXT_MAX, links=False))
-        except FileNotFoundError:
-            return
-        except (OSError, ValidationError) as error:
-            text = "{file}: cannot be read, so logs that waited to be measured are forgotten ({why})"
-            why = str(error).partition("\n")[0]
-            self._warn(phrase("event_no_queue", text, file=NAME, why=why))
-            return
         with self._lock:
             self._ids += [recording for recording in before if recording not in self._ids]
             del self._ids[_MOST_LOGS:]
-
-    def keep(self) -> None:
-        """Write the file, if anything has changed."""
-        ids = self.ids
-        if ids == self._kept or not (ids or self._kept):
-            return
-        self._kept = ids  # a disk that refuses is told of once for each change
-        try:
-            replace_file(self._file, _IDS.dump_json(ids), links=False)
-        except OSError as error:
-            text = "{file}: cannot be written ({why}): a service that starts again does not know what to measure"
-            why = error.strerror or str(error)
-            self._warn(phrase("event_queue_not_kept", text, file=NAME, why=why))
-
-    def _warn(self, said: Phrase) -> None:
-        self._tell(Event.now(Level.WARNING, "analysis", said))
+            self._changed(list(self._ids))

@@ -32,10 +32,11 @@ TOO_SMALL = """least =>
 #: Words that stand on two lines, and buttons that do not hold their words.
 BROKEN = r"""() => {
     const wrong = [];
-    const where = "button, .button, nav a, .brand, .pill, h1, h2, dt, label > span, .state-word";
+    const buttons = "button, .button, nav a, .brand, .pill";
+    const where = `${buttons}, h1, h2, dt, dd, p, figcaption, legend, label > span, .state-word`;
     for (const element of document.querySelectorAll(where)) {
         if (!element.checkVisibility({ visibilityProperty: true })) continue;
-        if (element.matches("button, .button, nav a, .brand, .pill") && !element.matches(".block, .unseen")
+        if (element.matches(buttons) && !element.matches(".block, .unseen")
             && element.scrollWidth > element.clientWidth + 1) wrong.push("cut off: " + element.outerHTML);
         const texts = document.createTreeWalker(element, NodeFilter.SHOW_TEXT);
         while (texts.nextNode()) {

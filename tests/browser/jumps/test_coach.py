@@ -1,5 +1,6 @@
 """The coach's screen, and the athlete's page behind its code, in a network that phones reach."""
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,12 +9,15 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, Request, expect
 
+from rig.api.jump import MeasuredValue
 from rig.api.recordings import RecordingOrder
-from tests.browser.conftest import MEASURED, Open
+from service.measuring.keeping import keep_result
+from tests.browser.conftest import MEASURED, Open, write_kinogram
 from tests.browser.views import AXE, BROKEN, assert_fits_a_phone
+from tests.recorder.logs import ALL_OK
 from tests.support.waiting import wait_until
 from tests.webpanel.door.test_links import Clock
-from tests.webpanel.memory_service import MemoryService
+from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel, serving
 from webpanel.door.access import Access
 from webpanel.door.links import Links
@@ -172,6 +176,60 @@ def test_a_link_shows_its_jump_and_nothing_else(hill: Hill, service: MemoryServi
     page.reload()
     expect(page.locator("#visit-problem")).to_have_text("this link has ended: scan the code of the jump again")
     expect(page.locator("#visit-who")).to_have_text("Svev")
+
+
+def test_of_a_recording_with_two_jumps_figures_and_pictures_are_of_one_jump(
+    hill: Hill, service: MemoryService, open_page: Open
+) -> None:
+    for other in ("jump-1", "jump-2"):
+        service.delete_recording(other)
+    log = write_recording(service.catalogue.directory, "both", (ALL_OK,) * 90, {"athlete": "Anna Berg", "bib": "17"})
+    (made := log.with_name("made")).mkdir()
+    write_kinogram(made, "17", "Anna Berg", 100)
+    (made / "kinogram-2.jpg").write_bytes(to_jpeg(np.zeros((40, 200), np.uint8)))
+    for end in ("", "-2"):
+        (made / f"jumper{end}.c3d").write_text("C3D")
+    pulses = [{"number": number, "takeoff": {"pulse": pulse}} for number, pulse in ((1, 12.0), (2, 61.0))]
+    (made / "jumper.json").write_text(json.dumps({"jumps": pulses}))
+    speeds = [MeasuredValue(value=speed, sigma=0.01) for speed in (25.0, 26.0)]
+    jumps = tuple(
+        MEASURED.model_copy(update={"recording": "both", "jump": number, "takeoff_speed": speed})
+        for number, speed in enumerate(speeds, 1)
+    )
+    keep_result(made, log, jumps)
+    service.last_jump = jumps[-1]
+    with hill.panel.client(headers={"Authorization": f"Bearer {TOKEN}", "Host": f"{NAME}:{hill.panel.port}"}) as coach:
+        link = coach.get("/api/recordings/both/link").json()["link"]
+    phone = open_page(link, width=360, height=780, has_touch=True, is_mobile=True, reduced_motion="reduce")
+    replay, picture = phone.locator("#visit-replay"), phone.locator("#visit-pictures img")
+    for number, pulse, speed, width in ((2, "61", "93.6", 200), (1, "12", "90.0", 100)):
+        choice = phone.locator("#visit-choice").get_by_role("button", name=f"Jump {number}")
+        if number == 1:
+            choice.click()
+        expect(choice).to_have_attribute("aria-pressed", "true")
+        expect(replay).to_have_attribute("data-pulse", pulse)  # it stands still at the take-off
+        expect(phone.locator("#visit-figures > div").first).to_contain_text(f"{speed}\u202fkm/h")
+        expect(picture).to_have_count(1)
+        expect(picture).to_have_js_property("naturalWidth", width)
+        expect(phone.locator("#visit-others a")).to_have_count(2)  # one C3D, and the kinogram's file
+    assert_fits_a_phone(phone)
+
+    screen = open_page("about:blank")
+    asked = _watched(screen)
+    screen.goto(f"{hill.url}/#/coach")
+    hill.log_in(screen)
+    expect(screen.locator("#coach-figures b").first).to_have_text("93.6")
+    expect(screen.locator("#coach-replay")).to_have_attribute("data-stage", "ready")
+    assert [path for path in asked if "/moment" in path][-1].endswith("both/moment?jump=2")
+
+    live = open_page("about:blank", reduced_motion="reduce")
+    live.goto(f"{hill.url}/#/live")
+    hill.log_in(live)
+    live.locator("#measured").scroll_into_view_if_needed()
+    expect(live.locator("#measured-figures > div").first).to_contain_text("93.6")
+    expect(live.locator("#measured-replay")).to_have_attribute("data-pulse", "61")
+    live.locator("#measured-who").click()
+    expect(live.locator("#jump-choice").get_by_role("button", name="Jump 2")).to_have_attribute("aria-pressed", "true")
 
 
 def test_a_link_is_taken_back_on_the_page_of_its_jump(hill: Hill, open_page: Open) -> None:

@@ -136,6 +136,32 @@ def test_four_alarms_and_a_refused_list_leave_record_and_save_in_reach(
     expect(page.locator(".snack")).to_have_count(0)
 
 
+@pytest.mark.parametrize("size", repeats([[SMALL_LAPTOP], [LAPTOP], [TABLET]]), ids="{0[0]}x{0[1]}".format)
+def test_the_last_jump_is_large_enough_to_be_seen_and_its_words_are_whole(
+    panel: Panel, service: MemoryService, jumps: None, open_page: Open, size: tuple[int, int]
+) -> None:
+    service.last_jump = MEASURED
+    page = open_page(panel.url, width=size[0], height=size[1], locale="nb-NO", reduced_motion="reduce")
+    page.locator("#measured").scroll_into_view_if_needed()
+    expect(page.locator("#measured-replay")).to_have_attribute("data-stage", "ready")
+    box = page.locator("#measured-replay canvas").bounding_box()
+    assert box is not None
+    assert box["height"] > 120
+    assert page.evaluate(BROKEN) == []
+
+
+def test_a_tablet_held_across_shows_all_figures_of_the_coachs_screen_in_one_row(
+    panel: Panel, jumps: None, open_page: Open
+) -> None:
+    page = open_page(panel.url, width=SMALL_LAPTOP[0], height=SMALL_LAPTOP[1])
+    enter(page, panel, "coach")
+    figures = page.locator("#coach-figures > div")
+    expect(figures).to_have_count(5)
+    assert len({round(each["y"]) for figure in figures.all() if (each := figure.bounding_box())}) == 1
+    wide = "elements => elements.every(each => each.scrollWidth <= each.parentElement.clientWidth)"
+    assert page.locator("#coach-figures b").evaluate_all(wide)
+
+
 def _swiped(page: Page, distance: int, camera: str) -> bool:
     """Swipe over the pictures: whether another camera is shown then, which must be `camera`."""
     shown = page.locator("#preview .block:visible .name")

@@ -50,6 +50,7 @@ export const words = {
   "measurement.state_failed": "failed",
   "measurement.progress": "Progress of this step",
   "measurement.jump": "Jump {jump}, {time}",
+  "measurement.which": "Jump of this recording",
   "measurement.report": "The coach's page",
   "measurement.protocol": "Protocol",
   "measurement.video": "Video",

@@ -1,7 +1,6 @@
 /** English words of what was measured, over the pictures and beside them. Every key stands in nb-viewing.js too (a test looks). */
 export const words = {
   "jump.number": "Jump {jump}",
-  "jump.which": "Jump of this recording",
   "jump.stick": "Stick figure",
   "jump.full_screen": "Full screen",
   "jump.more": "More",

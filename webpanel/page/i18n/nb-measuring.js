@@ -50,6 +50,7 @@ export const words = {
   "measurement.state_failed": "mislyktes",
   "measurement.progress": "Hvor langt dette steget er kommet",
   "measurement.jump": "Hopp {jump}, {time}",
+  "measurement.which": "Hopp i dette opptaket",
   "measurement.report": "Trenerens side",
   "measurement.protocol": "Protokoll",
   "measurement.video": "Video",

@@ -1,7 +1,6 @@
 /** Norwegian words of what was measured, over the pictures and beside them. */
 export const words = {
   "jump.number": "Hopp {jump}",
-  "jump.which": "Hopp i dette opptaket",
   "jump.stick": "Strekfigur",
   "jump.full_screen": "Fullskjerm",
   "jump.more": "Mer",

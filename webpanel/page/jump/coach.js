@@ -111,7 +111,7 @@ function drawJump() {
   $("coach-mark").dataset.level = level ?? "";
   setText($("coach-far"), recording ? howFar(measured, Boolean(figures)) : "");
   drawFigures(figures);
-  replay.show(recording?.id ?? "", measured?.measured ?? "");
+  replay.show(recording?.id ?? "", measured?.measured ?? "", figures?.jump);
   void drawCode(recording?.id ?? "");
 }
 

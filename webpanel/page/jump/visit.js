@@ -10,6 +10,7 @@ import { fillFigures, levelOf, MARKS, verdictOf } from "../shared/figures.js";
 import { day, timeOfDay, timeOfMinute } from "../shared/format.js";
 import { howFar, measurementOf, named } from "../shared/latest.js";
 import { makeReplay } from "../shared/replay.js";
+import { filesOf } from "../shared/resultfiles.js";
 import { known } from "../shared/store.js";
 
 /** So often it is asked again while the jump is being measured, or there is no connection, ms. */
@@ -24,6 +25,8 @@ const PICTURE = /^kinogram(?:-\d+)?\.jpg$/;
 /** What the browser shows itself instead of keeping it. */
 const SHOWN = /\.(html|txt|mp4|jpg)$/;
 
+/** @typedef {import("../shared/types.js").LastJump} LastJump */
+
 /** @type {import("../shared/replay.js").Replay} */
 let replay;
 /** Number of the visit that began last: those before it are over. */
@@ -35,6 +38,8 @@ let ends = "";
 let recording = null;
 /** @type {import("../shared/latest.js").Measured|null} */
 let measured = null;
+/** Number of the jump that is looked at, where the recording has several; 0: the last one, until somebody chooses. */
+let chosen = 0;
 /** Recording, files and language of what `drawFiles` has drawn. */
 let drawn = "";
 /** Why nothing more can be shown; null: all is well. @type {Problem|null} */
@@ -52,7 +57,7 @@ export function startVisit() {
  */
 export async function enterVisit(recordingId, key) {
   const own = ++visits;
-  [id, ends, recording, measured, wrong] = [recordingId, "", null, null, null];
+  [id, ends, recording, measured, wrong, chosen] = [recordingId, "", null, null, null, 0];
   drawVisit();
   while (own === visits) {
     const again = await look(key, () => own === visits);
@@ -81,7 +86,6 @@ async function look(key, wanted) {
     const [found, figures] = [await call("GET", recordingPath(id)), await measurementOf(id)];
     if (!wanted()) return false;
     [recording, measured, wrong] = [found, figures, null];
-    replay.show(id, figures.measured ?? "");
   } catch (error) {
     if (!(error instanceof Problem)) throw error;
     if (!wanted()) return false;
@@ -94,7 +98,8 @@ async function look(key, wanted) {
 
 /** Draw it, also anew in another language. */
 export function drawVisit() {
-  const figures = measured?.figures.at(-1) ?? null;
+  const all = measured?.figures ?? [];
+  const figures = all.find(({ jump }) => jump === chosen) ?? all.at(-1) ?? null;
   const lost = wrong !== null && (wrong.status === 0 || wrong.status >= 500);
   const shown = wrong && !lost ? null : recording;
   setText($("visit-problem"), !wrong ? "" : lost ? t("visit.lost") : say(wrong.said).text);
@@ -102,6 +107,8 @@ export function drawVisit() {
   $("visit-jump").hidden = !shown;
   setText($("visit-who"), shown ? named(shown.session) : "Svev");
   if (!shown) return replay.show("");
+  replay.show(id, measured?.measured ?? "", figures?.jump);
+  drawChoice(all, figures);
   setText($("visit-time"), shown.started ? `${day(shown.started)}, ${timeOfDay(shown.started)}` : "");
   const level = figures && levelOf(figures, measured?.live);
   setText($("visit-mark"), level ? t(MARKS[level]) : "");
@@ -111,9 +118,25 @@ export function drawVisit() {
   setText($("visit-why"), figures && !figures.ok ? verdictOf(figures) : "");
   $("visit-figures").hidden = !figures;
   if (figures) fillFigures($("visit-figures"), figures);
-  drawFiles(measured?.files ?? []);
+  drawFiles(filesOf(measured?.files ?? [], figures ? all.indexOf(figures) + 1 : 1));
   setText($("visit-until"), ends ? t("visit.until", { day: day(ends), time: timeOfMinute(ends) }) : "");
   replay.draw();
+}
+
+/**
+ * The jumps of the recording, if there are several: his own may be any of them.
+ *
+ * @param {LastJump[]} all
+ * @param {LastJump|null} shown
+ */
+function drawChoice(all, shown) {
+  const row = $("visit-choice");
+  const focused = row.contains(document.activeElement);
+  row.hidden = all.length < 2;
+  row.replaceChildren(...all.map((each) => make("button", {
+    type: "button", "aria-pressed": String(each === shown), onclick: () => { chosen = each.jump; drawVisit(); },
+  }, t("measurement.jump", { jump: each.jump, time: timeOfDay(each.time) }))));
+  if (focused) row.querySelector('[aria-pressed="true"]')?.focus({ preventScroll: true });
 }
 
 /** @param {string[]} files */

@@ -40,9 +40,9 @@ function draw() {
   $("measured-far").hidden = !far;
   $("measured-why").hidden = !figures || figures.ok;
   if (!recording) return replay.show("");
-  if (near) replay.show(recording.id, measured?.measured ?? "");
+  if (near) replay.show(recording.id, measured?.measured ?? "", figures?.jump);
   setText($("measured-who"), named(recording.session));
-  $("measured-who").href = `#/recordings/${encodeURIComponent(recording.id)}`;
+  $("measured-who").href = `#/recordings/${encodeURIComponent(recording.id)}${figures && figures.jump > 1 ? `/${figures.jump}` : ""}`;
   if (!figures) return;
   const level = levelOf(figures);
   $("measured-verdict").dataset.level = level;

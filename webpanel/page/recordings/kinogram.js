@@ -4,6 +4,7 @@ import { languageInUse, t } from "../i18n/i18n.js";
 import { asProblem, partOf, Problem } from "../shared/api.js";
 import { $, icon, make } from "../shared/dom.js";
 import { who } from "../shared/format.js";
+import { filesOf } from "../shared/resultfiles.js";
 import { attempt } from "../shared/snacks.js";
 import { jumpShown } from "../viewing/jumps.js";
 
@@ -12,7 +13,7 @@ import { jumpShown } from "../viewing/jumps.js";
 
 /** Files of the kinogram, which stand on its card and nowhere else. */
 export const KINOGRAM = /^kinogram/;
-const PICTURE = /^kinogram(?:-(\d+))?\.jpg$/;
+const PICTURE = /^kinogram(?:-\d+)?\.jpg$/;
 
 /** What is drawn, or being loaded: an answer to anything else is old. */
 let wanted = "";
@@ -31,7 +32,7 @@ export function startKinogram() {
  */
 export function showKinogram(recording, measured) {
   const place = (measured?.figures ?? []).findIndex(({ jump }) => jump === jumpShown());
-  const names = (measured?.files ?? []).filter((name) => PICTURE.test(name) && orderOf(name) === Math.max(0, place) + 1);
+  const names = filesOf(measured?.files ?? [], Math.max(0, place) + 1).filter((name) => PICTURE.test(name));
   const { athlete = "", bib = "" } = recording?.session ?? {};
   const now = recording && names.length ? JSON.stringify([languageInUse(), recording.id, measured?.measured, names, athlete, bib]) : "";
   if (now === wanted) return;
@@ -46,11 +47,6 @@ function clear() {
   if ($("kinogram-large").open) $("kinogram-large").close();
   addresses.forEach((address) => URL.revokeObjectURL(address));
   addresses = [];
-}
-
-/** @param {string} name of a picture */
-function orderOf(name) {
-  return Number(name.match(PICTURE)?.[1] ?? 1);
 }
 
 /**

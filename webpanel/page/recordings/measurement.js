@@ -5,6 +5,7 @@ import { call, partOf, Problem, recordingPath } from "../shared/api.js";
 import { $, icon, make, makeMark, setText } from "../shared/dom.js";
 import { fillFigures, levelOf, MARKS, verdictOf } from "../shared/figures.js";
 import { day, number, timeOfDay } from "../shared/format.js";
+import { filesOf } from "../shared/resultfiles.js";
 import { place } from "../shared/router.js";
 import { attempt, tell, tellProblem } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
@@ -19,8 +20,6 @@ import { showJump } from "./jump.js";
 const QUEUED = ["waiting", "measuring"];
 /** Files of the result that people open, in this order; any others come after them, folded away. */
 const FILES = [/^report\.html$/, /^overlay\.mp4$/, /\.c3d$/, /\.trc$/, /\.csv$/, /^protocol\.html$/];
-/** Of these every jump has its own; all others are of the whole recording. */
-const OF_ONE = /\.(c3d|trc)$/;
 /** What the browser shows itself instead of keeping it. */
 const SHOWN = /\.(html|txt|mp4)$/;
 
@@ -210,14 +209,9 @@ function makeJump(jump, live, several) {
  * @returns {[string[], string[]]}
  */
 function sorted(files, order) {
-  const own = files.filter((name) => !OF_ONE.test(name) || jumpOf(name) === order);
+  const own = filesOf(files, order);
   const first = FILES.flatMap((kind) => own.filter((name) => kind.test(name)));
   return [first, own.filter((name) => !first.includes(name))];
-}
-
-/** @param {string} name of a file: that of the first jump has no number */
-function jumpOf(name) {
-  return Number(name.match(/-(\d+)\.\w+$/)?.[1] ?? 1);
 }
 
 /**

@@ -5,7 +5,7 @@
  * the recorder then. They are kept as they came and decoded one at a time, so that a small device can show them too.
  *
  * @typedef {object} Replay
- * @property {(id: string, version?: string) => void} show a recording; "": none. Another version: its moment may be another one.
+ * @property {(id: string, version?: string, jump?: number) => void} show a jump of a recording; "": none. Another version: its moment may be another one.
  * @property {() => void} draw the words anew, in another language
  */
 
@@ -38,8 +38,8 @@ const IDLE_MS = 500;
 
 /** @type {Scene} */
 const NOTHING = { frames: [], kind: "none", moment: 0, cameras: [], columns: [] };
-/** The window is too narrow for all cameras side by side. */
-const NARROW = matchMedia("(max-width: 599px)");
+/** In less than this all cameras side by side would be too small to see a jumper in, px. */
+const WIDE_ENOUGH_PX = 480;
 
 /**
  * @param {HTMLElement} root
@@ -55,8 +55,8 @@ export function makeReplay(root, { may, button }) {
   root.append(canvas, make("div", { class: "replay-foot" }, words, ...button ? [other, play] : []));
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
 
-  /** Recording and version that are shown. */
-  let [id, known] = ["", ""];
+  /** Recording, version and number of the jump that are shown. */
+  let [id, known, number] = ["", "", 1];
   /** Numbers of the loading and of the showing that began last: those before them are given up. */
   let [loads, runs] = [0, 0];
   /** What is shown. @type {Scene} */
@@ -64,8 +64,8 @@ export function makeReplay(root, { may, button }) {
   /** @type {Stage} */
   let stage = "";
   let playing = !still;
-  /** Which camera is shown, counted on and on; 0: all. Where nobody can choose, each has its turn. */
-  let camera = NARROW.matches ? 1 : 0;
+  /** Which camera is shown, counted on and on; 0: all; -1: not chosen yet. Where nobody can choose, each has its turn. */
+  let camera = -1;
   /** What is in sight. @type {Frame|null} */
   let painted = null;
   let wake = () => {};
@@ -82,7 +82,7 @@ export function makeReplay(root, { may, button }) {
         if (!may()) await waitFor(own);
         if (own !== loads) return;
         become("loading");
-        if (!coming.frames.length) coming = await choose(id);
+        if (!coming.frames.length) coming = await choose(id, number);
         for (const frame of coming.frames.filter(({ image }) => !image)) {
           if (own !== loads || !may()) break;
           frame.image = await fetchPicture(id, frame.pulse);
@@ -90,6 +90,7 @@ export function makeReplay(root, { may, button }) {
         if (own !== loads) return;
         if (coming.frames.some(({ image }) => !image)) continue;
         scene = coming;
+        if (camera < 0) camera = root.clientWidth < WIDE_ENOUGH_PX ? 1 : 0;
         become(scene.frames.length ? "ready" : "none");
         if (scene.frames.length) void run(++runs);
         return;
@@ -129,7 +130,7 @@ export function makeReplay(root, { may, button }) {
 
   /** Index of the one camera that is shown; -1: all. */
   function one() {
-    return camera % (scene.cameras.length + 1) - 1;
+    return Math.max(0, camera) % (scene.cameras.length + 1) - 1;
   }
 
   /** @param {Frame|null} frame */
@@ -178,13 +179,13 @@ export function makeReplay(root, { may, button }) {
 
   return {
     draw,
-    show(recording, version = "") {
-      if (recording === id && (version === known || !id)) return;
+    show(recording, version = "", jump = 1) {
+      if (recording === id && (version === known && jump === number || !id)) return;
       if (recording !== id) {
         scene = NOTHING; // nothing of another jump is shown, not even for a moment
         runs += 1;
       }
-      [id, known] = [recording, version];
+      [id, known, number] = [recording, version, jump];
       loads += 1;
       wake();
       become("");
@@ -194,16 +195,17 @@ export function makeReplay(root, { may, button }) {
 }
 
 /**
- * Choose the pictures of a recording.
+ * Choose the pictures of a jump.
  *
- * @param {string} id
+ * @param {string} id of its recording
+ * @param {number} jump its number
  * @returns {Promise<Scene>}
  * @throws {Problem}
  */
-async function choose(id) {
+async function choose(id, jump) {
   /** @type {import("./types.js").Pulses} */
   const { pulses, cameras, columns } = await call("GET", recordingPath(id, "/pulses"));
-  const found = await call("GET", recordingPath(id, "/moment"));
+  const found = await call("GET", recordingPath(id, `/moment?jump=${jump}`));
   if (!pulses.length) return NOTHING;
   const at = Math.max(0, found.pulse === null ? Math.floor(pulses.length / 2) : pulses.findIndex(({ pulse }) => pulse === found.pulse));
   const middle = pulses[at];

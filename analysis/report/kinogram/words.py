@@ -66,9 +66,9 @@ def where_words(shot: Shot) -> str:
 
 
 def number_words(name: str, quantity: Quantity) -> list[str]:
-    """A figure with its sigma as everywhere; the take-off speed in km/h too."""
+    """A figure with its sigma as everywhere; a speed in km/h too, as on the jump's page."""
     lines = [plus_minus(quantity, UNITS[name])]
-    if name == "takeoff_speed":
+    if name in {"takeoff_speed", "speed_20_m"}:
         lines.append(f"{fixed(KMH * quantity.value, 1)} km/h")
     return lines
 

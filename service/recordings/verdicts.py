@@ -47,7 +47,7 @@ def _values(entry: Entry) -> dict[str, Value]:
         "pulses": entry.pulses, "complete": entry.complete, "partial": entry.partial, "missing": entry.missing,
         "failures": _failures(entry), "pauses": len(entry.pauses),
         "paused_s": round(sum(pause.seconds for pause in entry.pauses), 1), "disk": entry.disk,
-        "longest_s": entry.forgotten_s, "why": _reason(entry.ended_early),
+        "longest_s": entry.forgotten_s, "trouble": entry.trouble, "why": _reason(entry.ended_early),
         "before": entry.session.get(CONTINUES, "")[:LONGEST_SHOWN],
         "unrecorded": sum(pause.pulses for pause in entry.pauses if pause.between_logs),
     }  # fmt: skip

@@ -2,6 +2,7 @@
 
 import re
 
+import pytest
 from playwright.sync_api import expect
 
 from rig.errors import StorageError
@@ -9,7 +10,7 @@ from rig.phrase import phrase, plain
 from service.status.statements import recording_ended
 from tests.browser.conftest import Open
 from tests.browser.views import enter
-from tests.webpanel.memory_service import MemoryService
+from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel
 
 
@@ -34,6 +35,25 @@ def test_norwegian_from_the_browser_and_by_choice(
     expect(page.locator("#recording-verdict")).to_contain_text("1 of 30 pulses lack a frame")
     page.reload()
     expect(page.locator("html")).to_have_attribute("lang", "en")
+
+
+def test_what_has_no_norwegian_of_its_own_is_quoted_behind_what_kind_it_is(
+    panel: Panel, service: MemoryService, open_page: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise StorageError("/media/jumps: cannot be written (Input/output error); make room")
+
+    page = open_page(panel.url, locale="nb-NO")
+    expect(page.locator("#state-word")).to_have_text("Av")
+    monkeypatch.setattr(service, "arm", refuse)
+    page.locator("#next-step").click()
+    said = "det kan ikke skrives på disken: sjekk plass og feste (/media/jumps: cannot be written"
+    expect(page.locator(".snack")).to_contain_text(said)
+    (service.catalogue.directory / "strange.session.json").write_text("{")
+    write_recording(service.catalogue.directory, "strange")
+    page.goto(f"{panel.url}/#/recordings/strange")
+    quoted = re.compile("Rettelsene ved siden av opptaket kan ikke leses: .*strange.session.json")
+    expect(page.locator("#recording-verdict")).to_have_text(quoted)
 
 
 def test_check_log_and_reasons_are_said_in_the_language_chosen(

@@ -198,8 +198,9 @@ def test_whatever_the_service_states_or_refuses_is_said_in_norwegian_too() -> No
         stated |= set(
             re.findall(r'(?:ProblemError\(|_unauthorized\(|_refuse\(|problem\()\s*(?:[\w.]+, )?"(\w+)"', text)
         )
-    verdicts = (ROOT / "service" / "recordings" / "archive.py").read_text()
-    stated |= {f"verdict_{word}" for word in re.findall(r'Level\.\w+, "(\w+)", ', verdicts)}
+    verdicts = set(re.findall(r'Level\.\w+, "(\w+)", ', (ROOT / "service" / "recordings" / "verdicts.py").read_text()))
+    assert {"complete", "headless", "disk_full"} <= verdicts
+    stated |= {f"verdict_{word}" for word in verdicts}
     assert len(stated) > 20
     assert stated <= set(translated)
 

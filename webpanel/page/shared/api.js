@@ -18,8 +18,8 @@ export class Problem extends Error {
     super(detail);
     this.status = status;
     this.code = code;
-    /** To be said: in words of its kind, where the detail itself has no code. @type {Said} */
-    this.said = told ?? { code, text: detail };
+    /** To be said: in words of its kind, which may quote the detail, where that has no code of its own. @type {Said} */
+    this.said = told ?? { code, text: detail, values: { detail } };
     /** To be said within a sentence: the detail itself. @type {Said} */
     this.detail = told ?? { code: "", text: detail };
   }

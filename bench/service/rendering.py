@@ -17,6 +17,8 @@ _PAGES: Final = {
         f"#/recordings/{_NEWEST}",
         'document.querySelectorAll("#compare option").length === 100',
     ),
+    "coach's screen": ("#/coach", 'document.querySelector("#coach-replay")?.dataset.stage === "ready"'),
+    "athlete's phone": (f"#/jump/{_NEWEST}", 'document.querySelector("#visit-replay")?.dataset.stage === "ready"'),
 }
 
 

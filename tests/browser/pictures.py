@@ -10,7 +10,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
@@ -19,7 +19,7 @@ from urllib.parse import quote
 
 import cv2
 import numpy as np
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
 from bench.analysis.hill_logs import write_hill_log
 from tests.analysis.simulated import training
@@ -37,6 +37,11 @@ TOKEN: Final = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of thes
 #: What a sheet shows, side by side, and how large.
 SHEET: Final = ((1280, "light", "en"), (768, "dark", "nb"), (360, "dark", "en"), (360, "light", "nb"))
 SCALE: Final = 0.6
+#: What a phone shows of a jump below its kinogram: what is at the top, how it looks, and in which language.
+PHONE: Final[tuple[tuple[str, Literal["light", "dark"], str], ...]] = (
+    ("#player", "light", "en"), ("#curves", "light", "en"), ("#player", "dark", "nb"),
+)  # fmt: skip
+PHONE_SIZE: Final = (360, 780)
 SCHEMES: Final[tuple[Literal["light", "dark"], ...]] = ("light", "dark")
 LANGUAGES: Final = ("en-GB", "nb-NO")
 #: What is there when a view has what it shows.
@@ -97,7 +102,29 @@ def take(browser: Browser, service: Serving, out: Path) -> None:
             page.close()
         context.close()
     for name in VIEWS:
-        _write_sheet(out, name)
+        shown = [_picture(out, name, *how) for how in SHEET]
+        _write_sheet(out / f"panel-{name}.jpg", shown, SCALE)
+    _write_sheet(out / "panel-jump-phone.jpg", [_on_a_phone(browser, address, out, *how) for how in PHONE], 1.0)
+
+
+def _on_a_phone(
+    browser: Browser, address: str, out: Path, top: str, scheme: Literal["light", "dark"], language: str
+) -> Path:
+    width, height = PHONE_SIZE
+    size: ViewportSize = {"width": width, "height": height}
+    context = browser.new_context(viewport=size, locale=language, color_scheme=scheme, has_touch=True, is_mobile=True)
+    _log_in(context.new_page(), address)
+    page = context.new_page()
+    path, ready = VIEWS["jump"]
+    page.goto(f"{address}/{path}")
+    page.locator(ready).first.wait_for()
+    page.locator("#curves-plots svg").first.wait_for()
+    page.evaluate("top => scrollTo(0, document.querySelector(top).getBoundingClientRect().top - 64)", top)
+    page.locator("#frames .stick").first.wait_for()
+    picture = out / f"phone-{top[1:]}-{scheme}-{language}.png"
+    page.screenshot(path=picture)
+    context.close()
+    return picture
 
 
 def _log_in(page: Page, address: str) -> None:
@@ -112,16 +139,16 @@ def _picture(out: Path, name: str, width: int, scheme: str, language: str) -> Pa
     return out / f"{name}-{width}-{scheme}-{language}.png"
 
 
-def _write_sheet(out: Path, name: str) -> None:
-    """The pictures of a view that stand for all, side by side with a gap, as a small file."""
-    row = []
-    for width, scheme, language in SHEET:
-        picture = cv2.imread(str(_picture(out, name, width, scheme, language)))
+def _write_sheet(out: Path, shown: Sequence[Path], scale: float) -> None:
+    """Pictures of one height side by side with a gap, as a small file."""
+    row: list[np.ndarray] = []
+    for path in shown:
+        picture = cv2.imread(str(path))
         if picture is None:
-            raise FileNotFoundError(f"no picture of {name}")
-        row += [picture, np.full((HEIGHT, 24, 3), 255, np.uint8)]
-    sheet = cv2.resize(np.hstack(row[:-1]), None, fx=SCALE, fy=SCALE, interpolation=cv2.INTER_AREA)
-    cv2.imwrite(str(out / f"panel-{name}.jpg"), sheet, [cv2.IMWRITE_JPEG_QUALITY, 80])
+            raise FileNotFoundError(f"no picture {path}")
+        row += [picture, np.full((len(picture), 24, 3), 255, np.uint8)]
+    sheet = cv2.resize(np.hstack(row[:-1]), None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(out), sheet, [cv2.IMWRITE_JPEG_QUALITY, 80])
 
 
 def main() -> None:

@@ -14,8 +14,11 @@ from rig.api.measuring import AfterStep, MeasuringQueue, MeasuringState, Measuri
 from rig.api.recordings import RecordingOrder
 from rig.api.statement import Level, Statement
 from rig.api.status import State
+from rig.errors import NoJumpError
+from rig.phrase import phrase
 from rig.settings.model import AnalysisSettings
 from service.measuring.keeping import keep_problem, keep_step
+from service.offloading.notes import as_warning
 from tests.browser.conftest import Open, keep_measured
 from tests.browser.views import assert_fits_a_phone
 from tests.webpanel.memory_service import MemoryService
@@ -242,13 +245,17 @@ def test_the_live_view_says_whose_jump_was_last_how_it_was_and_how_many_wait(
     expect(card).to_be_hidden()
 
 
+@pytest.mark.parametrize("outcome", [NoJumpError(phrase("why_no_jump", "no jumper in {log}", log="jump-2")), None])
 def test_a_recording_without_a_jump_does_not_take_the_place_of_the_last_jump(
-    panel: Panel, service: MemoryService, log: Path, open_page: Open
+    panel: Panel, service: MemoryService, log: Path, open_page: Open, outcome: NoJumpError | None
 ) -> None:
     keep_measured(log, (LIVE.model_copy(update={"live": False, "ok": True}),))
     nobody = service.catalogue.file("jump-2")
     shutil.rmtree(nobody.with_name("jump-2.measured"))
-    keep_measured(nobody, ())
+    if isinstance(outcome, NoJumpError):
+        keep_problem(nobody, as_warning(outcome.said))
+    else:
+        keep_measured(nobody, ())
     page = open_page(panel.url)
     expect(page.locator("#measured-who")).to_have_text("4 · Ola <b>Nordmann</b>")
     expect(page.locator("#measured-far")).to_have_text("No jump was found in it")

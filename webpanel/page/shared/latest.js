@@ -12,8 +12,11 @@ import { known, update, watch } from "./store.js";
  * What is needed of the answer about a measurement.
  *
  * @typedef {{ state: import("./types.js").MeasuringQueue["state"], paused: boolean, before: number, measured: string|null,
- *   figures: LastJump[], live: boolean, files: string[], renaming: boolean }} Measured
+ *   figures: LastJump[], live: boolean, files: string[], renaming: boolean, problem: import("./types.js").Statement|null }} Measured
  */
+
+/** Code of the problem that the analysis finds no jumper in a log. */
+const NO_JUMPER = "why_no_jump";
 
 /** @type {{ recording: Recording|null, measured: Measured|null }} */
 export const latest = { recording: null, measured: null };
@@ -62,10 +65,18 @@ async function find(jump) {
   const ended = newest.find((/** @type {Recording} */ each) => each.state !== "recording");
   if (!ended) return { recording: null, measured: null };
   const measured = await measurementOf(ended.id);
-  if (!jump || jump.recording === ended.id || measured.state !== "done" || measured.figures.length) return { recording: ended, measured };
-  // Nobody jumped in it: the last jump is the one before.
+  if (!jump || jump.recording === ended.id || !isWithoutJumper(measured)) return { recording: ended, measured };
   const before = await call("GET", recordingPath(jump.recording));
   return before.deleted ? { recording: ended, measured } : { recording: before, measured: await measurementOf(before.id) };
+}
+
+/**
+ * Whether it was measured, and nobody jumps in it: then the last jump is the one before.
+ *
+ * @param {Measured} measured
+ */
+function isWithoutJumper({ state, problem, figures }) {
+  return !figures.length && (state === "done" || state === "failed" && problem?.code === NO_JUMPER);
 }
 
 /**
@@ -113,6 +124,6 @@ export function howFar(measured, figures) {
     waiting: before ? t("jump.waiting_behind", { before }) : t("jump.waiting"),
     measuring: t(paused ? "jump.paused" : "jump.measuring"),
     done: figures ? "" : t("jump.nobody"),
-    failed: t("jump.failed"),
+    failed: t(isWithoutJumper(measured) ? "jump.nobody" : "jump.failed"),
   }[state];
 }

@@ -359,6 +359,17 @@ class CurvePoint(Model):
     sigma: float
 
 
+class HandCurves(Model):
+    """Curves of all quantities from the marks of a session, and how far newer ones are."""
+
+    state: Literal["none", "computing", "done", "failed"]
+    revision: int = Field(0, description="of the session from whose marks these curves come")
+    paused: bool = Field(False, description="the computing stands still while a recording runs")
+    problem: Phrase | None = Field(None, description="why newer ones could not be computed, and what to do")
+    said: tuple[Phrase, ...] = Field((), description="the verdicts on its jumps, sentence by sentence")
+    curves: dict[str, list[CurvePoint]] = Field({})
+
+
 class HandResult(Model):
     """How far the computing of a session is, and what it gave."""
 
@@ -368,7 +379,6 @@ class HandResult(Model):
     paused: bool = Field(False, description="it stands still while a recording runs")
     problem: Phrase | None = Field(None, description="why it could not be computed, and what to do")
     said: tuple[Phrase, ...] = Field((), description="the verdicts on its jumps, sentence by sentence")
-    curves: dict[str, list[CurvePoint]] = Field({})
     files: tuple[str, ...] = ()
 
 

@@ -44,6 +44,7 @@ class Errands(Generic[State]):
             removed afterwards. It may take long, and raise OSError or SvevError.
         failed: gives the state from the one before the errand and the reason.
         folder: in which programs get a folder for their files; made if it is missing. None: that of the system.
+        yielding: whether programs take only the processor time that nobody else wants, also where nothing is recorded.
     """
 
     def __init__(
@@ -56,7 +57,9 @@ class Errands(Generic[State]):
         done: Callable[[str, Any, Path], State],
         failed: Callable[[State, Phrase], State],
         folder: Path | None = None,
+        yielding: bool = False,
     ) -> None:
+        self._yielding = yielding or busy is not None
         self._program, self._nothing, self._busy = program, nothing, busy
         self._heard, self._done, self._failed, self._folder = heard, done, failed, folder
         self._states: dict[str, State] = {}
@@ -156,7 +159,7 @@ class Errands(Generic[State]):
                 wanted=lambda: who in self._wanted,
                 tell=lambda news: self._hear(who, news),
                 hold=lambda held: self._hear(who, held),
-                yielding=self._busy is not None,
+                yielding=self._yielding,
             )
             if end is None or not self.works(who):
                 return None

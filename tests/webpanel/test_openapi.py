@@ -73,6 +73,7 @@ CALLS = {
     "POST /api/recordings/{recording_id}/digitizing/sessions/{operator}/compute",
     "DELETE /api/recordings/{recording_id}/digitizing/sessions/{operator}/compute",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/result",
+    "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/curves",
     "GET /api/recordings/{recording_id}/digitizing/sessions/{operator}/result/files/{name}",
     "DELETE /api/start-list/lines/{line}", "POST /api/start-list/lines/{line}/choose",
 }  # fmt: skip

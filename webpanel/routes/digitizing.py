@@ -16,6 +16,7 @@ from rig.api.digitizing import (
     Changes,
     Estimate,
     Geometry,
+    HandCurves,
     HandResult,
     Name,
     Opening,
@@ -231,6 +232,11 @@ def _add_results(router: APIRouter, opened: Callable[[str], Desk], base: str) ->
         """Take the marks of a file (`measurements.json`, a table, DLTdv's folder as ZIP); one undo takes all back."""
         kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
         return await run_sync(_taken_in, desk, operator, _IMPORTED.get(kind, ""), await request.body())
+
+    @router.get(base + "/curves", responses=refusals(404))
+    def get_curves(desk: AtDesk, operator: Operator) -> HandCurves:
+        """Curves of all quantities from the newest marks that are computed; asking begins with those that are newer."""
+        return desk.programs.curves(operator)
 
     @router.post(base + "/compute", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404))
     def compute(desk: AtDesk, operator: Operator, _: NoFields = None) -> HandResult:

@@ -11,7 +11,7 @@ from typing import Final
 
 from analysis.cameras.source import Source
 from analysis.measurements.model import Measurements
-from rig.api.digitizing import CurvePoint, HandResult
+from rig.api.digitizing import HandResult
 from rig.background.errands import Errands
 from rig.background.messages import Progress
 from rig.phrase import Phrase
@@ -36,12 +36,10 @@ class ComputedJump:
 
     Attributes:
         said: the verdicts, sentence by sentence.
-        curves: of all quantities, by name.
         files: names of the files in the folder.
     """
 
     said: tuple[Phrase, ...]
-    curves: dict[str, list[CurvePoint]]
     files: tuple[str, ...]
 
 
@@ -103,7 +101,7 @@ class Computing:
         whole = self._folder / f"{operator}{_SUFFIX}"
         shutil.rmtree(whole, ignore_errors=True)
         (made / RESULT).rename(whole)
-        return HandResult(state="done", said=computed.said, curves=computed.curves, files=computed.files)
+        return HandResult(state="done", said=computed.said, files=computed.files)
 
 
 def _heard(state: HandResult, news: Progress | bool) -> HandResult:

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 def _compute(order: "JumpOrder", folder: Path, tell: Teller) -> "ComputedJump":
     from analysis.digitizing.programs.computing import RESULT, ComputedJump  # noqa: PLC0415 - loaded with our priority
-    from analysis.digitizing.programs.curves import curves_of  # noqa: PLC0415
     from analysis.procedure.analyze import analyze  # noqa: PLC0415
     from analysis.procedure.result_folder import write_folder  # noqa: PLC0415
 
@@ -24,7 +23,7 @@ def _compute(order: "JumpOrder", folder: Path, tell: Teller) -> "ComputedJump":
     found = analyze(order.log, order.source, by_hand=order.measurements, images=False, progress=progress)
     files = write_folder(found, order.log, folder / RESULT, progress=progress)
     said = tuple(each for jump in found.result.jumps for each in jump.verdict.said)
-    return ComputedJump(said, curves_of(found.result), tuple(sorted(file.name for file in files)))
+    return ComputedJump(said, tuple(sorted(file.name for file in files)))
 
 
 def main() -> None:

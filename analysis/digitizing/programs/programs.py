@@ -10,11 +10,12 @@ from analysis.digitizing.marks.sessions import Sessions
 from analysis.digitizing.marks.things import BALL
 from analysis.digitizing.opened_log import OpenedLog
 from analysis.digitizing.programs.computing import Computing
+from analysis.digitizing.programs.curves import Curves, CurvesOrder
 from analysis.digitizing.programs.orienting import WAIT, Orienting
 from analysis.digitizing.programs.tracking import Follower
 from analysis.measurements.model import Measurements
 from analysis.scene.camera_system import CameraSystem
-from rig.api.digitizing import HandResult, OrientationState, Tracking, TrackOrder
+from rig.api.digitizing import HandCurves, HandResult, OrientationState, Tracking, TrackOrder
 from rig.errors import StateForbidsError
 from rig.phrase import phrase
 
@@ -38,12 +39,14 @@ class Programs:
         self._log, self._sessions, self._automatic = log, sessions, automatic
         self.orienting = Orienting(log, source, busy)
         self.computing = Computing(files.log, files.folder, busy)
+        self._curves = Curves(busy)
         self.follower = Follower(files.log, sessions.of, busy)
 
     def close(self) -> None:
         """End what is being done."""
         self.orienting.close()
         self.computing.close()
+        self._curves.close()
         self.follower.close()
 
     def oriented(self) -> CameraSystem:
@@ -99,6 +102,18 @@ class Programs:
             return self.measurements(operator), source
 
         return self.computing.begin(operator, order)
+
+    def curves(self, operator: str) -> HandCurves:
+        """The curves of an operator's marks as far as they are known; if there are newer marks, they follow."""
+        session, system, automatic = self._sessions.of(operator), self.orienting.system, self._automatic.all()
+        revision = session.revision
+        if system is None or (automatic is None and not revision):
+            return HandCurves(state="none")
+        # Marks of other pulses, be they many, would only delay the clicks meanwhile.
+        return self._curves.of(operator, (revision, automatic, system), lambda: CurvesOrder(
+            revision, automatic or self._log.unmeasured,
+            tuple(item for pulse in self._log.pulses for item in session.at(pulse).items()), self._log.times, system,
+        ))  # fmt: skip
 
     def measurements(self, operator: str) -> Measurements:
         """What counts of the automatic measurement and of an operator's marks."""

@@ -54,17 +54,16 @@ def _computed_angles_are_true(desk: Desk, jump: HillLog) -> bool:
     assert "report.html" in result.files
     found = desk.programs.computing.file("Anna", "jumper.json")
     assert found is not None
-    statuses = {
-        point["status"]
-        for pulse in json.loads(found.read_text())["jumps"][0]["pulses"]
-        for point in pulse["points"].values()
-        if point is not None
-    }
+    pulses = json.loads(found.read_text())["jumps"][0]["pulses"]
+    statuses = {point["status"] for pulse in pulses for point in pulse["points"].values() if point is not None}
     assert statuses == {"by hand"}
-    return all(
-        abs(point.value - jump.truth[point.pulse]["angles"]["alpha"]) < 5 * point.sigma
-        for point in result.curves["alpha"]
-    )
+    alphas = {pulse["pulse"]: (pulse["smoothed"] or {"angles": {"alpha": None}})["angles"]["alpha"] for pulse in pulses}
+    off = [
+        abs(alpha["value"] - jump.truth[pulse]["angles"]["alpha"]) / alpha["sigma"]
+        for pulse, alpha in alphas.items()
+        if alpha is not None
+    ]
+    return len(off) > 10 and max(off) < 5
 
 
 def test_a_wrong_click_is_named_and_the_worst_one_is_told_first(desk: Desk, jump: HillLog) -> None:

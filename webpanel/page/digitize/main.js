@@ -10,6 +10,7 @@ import { say, startLanguage, t } from "../i18n/i18n.js";
 import { Problem } from "../shared/api.js";
 import { $, setText } from "../shared/dom.js";
 import { update } from "../shared/store.js";
+import { drawCurves, startCurves } from "./cards/curves.js";
 import { startFiles } from "./cards/files.js";
 import { startNumbers } from "./cards/numbers.js";
 import { startOrientation } from "./cards/orientation.js";
@@ -57,8 +58,8 @@ async function open() {
   $("opening").hidden = true;
   $("desk").hidden = false;
   startPanes();
-  for (const start of [startThings, startPulses, startNumbers, startPicture, startGeometry, startOrientation, startTracking, startResults, startFiles, startTape]) start();
-  startKeys(() => { drawSpeeds(); drawResult(); drawTracking(); redraw(); });
+  for (const start of [startThings, startPulses, startNumbers, startPicture, startGeometry, startOrientation, startTracking, startCurves, startResults, startFiles, startTape]) start();
+  startKeys(() => { drawSpeeds(); drawCurves(); drawResult(); drawTracking(); redraw(); });
   $("undo").addEventListener("click", () => void takeBack("undo"));
   $("redo").addEventListener("click", () => void takeBack("redo"));
   $("act-refine").addEventListener("click", () => void refineHere());

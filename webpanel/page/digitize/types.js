@@ -157,6 +157,13 @@
  * @property {number} pulse
  * @property {number} value
  * @property {number} sigma
+ * @typedef {object} HandCurves
+ * @property {"none"|"computing"|"done"|"failed"} state
+ * @property {number} revision
+ * @property {boolean} paused
+ * @property {Phrase|null} problem
+ * @property {Phrase[]} said
+ * @property {Record<string, CurvePoint[]>} curves
  * @typedef {object} HandResult
  * @property {"none"|"computing"|"done"|"failed"} state
  * @property {string|null} step
@@ -164,7 +171,6 @@
  * @property {boolean} paused
  * @property {Phrase|null} problem
  * @property {Phrase[]} said
- * @property {Record<string, CurvePoint[]>} curves
  * @property {string[]} files
  *
  * @typedef {object} PointAgreement

@@ -5,11 +5,14 @@ import re
 import signal
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from analysis.digitizing.desk import Desk
 from analysis.digitizing.files import DeskFiles
 from bench.analysis.hill_logs import HillLog
-from rig.api.digitizing import HandResult
-from tests.analysis.digitizing.hill import Oriented, adopt, clicks
+from rig.api.digitizing import HandCurves, HandResult
+from tests.analysis.digitizing.hill import PATIENCE_S, Oriented, adopt, clicks
 from tests.support.waiting import wait_until
 
 
@@ -42,7 +45,64 @@ def test_a_program_that_was_killed_is_told(jump: HillLog, desk: Desk) -> None:
     assert [path.name for path in desk.files.folder.iterdir()] == ["Anna.jsonl"]
 
 
-def _child() -> int | None:
+@pytest.mark.alone
+@pytest.mark.timeout(3 * PATIENCE_S)
+def test_curves_follow_the_newest_marks(jump: HillLog, desk: Desk) -> None:
+    assert desk.programs.curves("Anna") == HandCurves(state="none"), "nothing is marked"
+    for click in clicks(desk, jump, 3, range(12, 13)):
+        desk.act("Anna", click.action())
+    short = _followed(desk)
+    assert not short.curves
+    assert "nothing to smooth" in "; ".join(map(str, short.said))
+    for click in clicks(desk, jump, 3, range(13, 22)):
+        desk.act("Anna", click.action())
+    first = _followed(desk)
+    assert first.revision == desk.session("Anna").revision
+    assert {"alpha", "beta", "gamma", "dphi", "phi", "height", "speed"} <= first.curves.keys()
+    errors = []
+    for name in ("alpha", "phi", "height"):
+        for point in first.curves[name]:
+            truth = jump.truth[point.pulse]
+            true = truth["height"] if name == "height" else truth["angles"][name]
+            errors.append((point.value - true) / point.sigma)
+    assert np.abs(errors).max() < 5
+    for click in clicks(desk, jump, 3, range(22, 25)):
+        desk.act("Anna", click.action())
+        earlier = desk.programs.curves("Anna")
+        assert earlier.curves, "those that are known stand until newer ones are there"
+    newest = _followed(desk)
+    assert newest.revision == desk.session("Anna").revision
+    assert newest.curves["alpha"][-1].pulse == 24
+    assert desk.programs.curves("Anna") == newest, "the same marks are not computed from again"
+
+
+@pytest.mark.alone
+@pytest.mark.timeout(2 * PATIENCE_S)
+def test_curves_that_were_not_computed_are_told_and_asked_for_again_with_the_next_mark(
+    jump: HillLog, desk: Desk
+) -> None:
+    some = list(clicks(desk, jump, 3, range(13, 21)))
+    for click in some[:-1]:
+        desk.act("Anna", click.action())
+    desk.programs.curves("Anna")
+    wait_until(lambda: _child("curves_program") is not None, "the program runs", 20)
+    assert os.sched_getscheduler(_child("curves_program") or 0) == os.SCHED_IDLE, "no click waits for it"
+    os.kill(_child("curves_program") or 0, signal.SIGKILL)
+    wait_until(lambda: desk.programs.curves("Anna").state == "failed", "it is told", 20)
+    assert _child("curves_program") is None
+    desk.act("Anna", some[-1].action())
+    assert _followed(desk).curves["alpha"]
+
+
+def _followed(desk: Desk) -> HandCurves:
+    """The curves of what is marked now."""
+    wait_until(lambda: desk.programs.curves("Anna").state != "computing", "they are computed", PATIENCE_S)
+    found = desk.programs.curves("Anna")
+    assert found.state == "done", found.problem
+    return found
+
+
+def _child(program: str = "computing_program") -> int | None:
     """The program that computes for this process."""
     for status in Path("/proc").glob("[0-9]*/status"):
         try:
@@ -50,6 +110,6 @@ def _child() -> int | None:
             command = (status.parent / "cmdline").read_bytes()
         except OSError:
             continue
-        if parent and int(parent[1]) == os.getpid() and b"computing_program" in command:
+        if parent and int(parent[1]) == os.getpid() and program.encode() in command:
             return int(status.parent.name)
     return None

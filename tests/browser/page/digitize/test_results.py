@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from tests.analysis.simulated import SIZE, training
 from tests.browser.conftest import Open
-from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, enter
+from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, enter, screen
 from tests.support.waiting import wait_until
 
 CAMERAS = ("K1", "K2", "K3")
@@ -58,6 +58,42 @@ def test_balls_that_were_clicked_orient_the_cameras(desk_by_survey: Desk, open_p
     expect(page.locator("#orient-clicked")).to_be_enabled()
 
 
+@pytest.mark.alone
+@pytest.mark.timeout(400)
+def test_curves_follow_while_one_measures_and_a_click_on_one_goes_to_its_pulse(desk: Desk, open_page: Open) -> None:
+    for pulse in range(6, 15):
+        for camera in CAMERAS:
+            for thing in ("P1", "P2", "P3", "P4"):
+                _mark(desk, camera, thing, desk.true(camera, thing, pulse), pulse)
+    page = enter(open_page, desk, width=1500, height=1000)
+    curve, curves = page.locator('#curves [data-of="height"]'), page.locator("#curves")
+    expect(curve).to_be_visible(timeout=100_000)  # nobody asked to compute
+    expect(page.locator("#result-state")).to_have_text("Nothing is computed yet.")
+    before = curve.locator(".line").get_attribute("d") or ""
+    assert before.count("L") == 8, "nine pulses"
+    plot = curve.locator(".plot")
+    plot.focus()
+    for thing in ("P1", "P2", "P3"):  # faster than curves are computed: the newest marks win, and no click waits
+        page.locator(f'[data-thing="{thing}"]').click()
+        page.mouse.click(*screen(page, "K1", np.add(desk.true("K1", thing), 1.5)))
+    plot.focus()
+    desk.wait_for(9 * 12 + 3)
+    expect(curves).to_have_attribute("data-revision", str(9 * 12 + 3), timeout=100_000)
+    expect(curves).to_have_attribute("aria-busy", "false")
+    assert curve.locator(".line").get_attribute("d") != before
+    expect(plot).to_be_focused()  # by its newest curve, too
+    known = desk.client.get(f"/sessions/{OPERATOR}/curves").json()["curves"]
+    assert {"height", "speed"} <= known.keys()
+    assert curves.locator("figure").count() == len(known)
+    box = plot.bounding_box()
+    assert box is not None
+    for share, pulse in ((0.02, 6), (0.5, 10), (0.98, 14)):
+        plot.click(position={"x": share * box["width"], "y": box["height"] / 2})
+        expect(page.locator("#pulse-number")).to_have_text(str(pulse))
+    page.keyboard.press("ArrowLeft")
+    expect(page.locator("#pulse-number")).to_have_text("13")
+
+
 @pytest.mark.long
 def test_a_jump_is_computed_goes_out_as_a_file_and_comes_back(desk: Desk, open_page: Open, tmp_path: Path) -> None:
     for pulse in range(6, 15):
@@ -85,3 +121,25 @@ def test_a_jump_is_computed_goes_out_as_a_file_and_comes_back(desk: Desk, open_p
     assert answer.status_code == 200
     page.locator("#import-file").set_input_files(kept)
     wait_until(lambda: desk.view()["marks"] == before, "the marks are back", 20)
+
+
+def test_two_operators_are_compared_on_the_page(desk: Desk, open_page: Open) -> None:
+    random = np.random.default_rng(5)
+    for operator, beside in ((OPERATOR, 0.0), ("Bo", 0.8)):
+        for pulse in range(8, 13):
+            for camera in CAMERAS:
+                for thing in ("P1", "P2", "P3", "P4"):
+                    x, y = (desk.true(camera, thing, pulse) + random.normal(0, 0.3, 2) + (beside, 0)).tolist()
+                    action = {"do": "place", "pulse": pulse, "camera": camera, "thing": thing, "xy": [x, y]}
+                    assert desk.client.post(f"/sessions/{operator}/actions", json=action).status_code == 200
+    page = enter(open_page, desk)
+    page.locator(".desk-more > details:last-child > summary").click()
+    page.locator("#compare").click()
+    row = page.locator("#compare-table tbody tr").filter(has_text="P1 helmet")
+    expect(row).to_contain_text("px")
+    cells = row.locator("td").all_inner_texts()
+    assert cells[0] == "15"
+    assert 0.15 < float(cells[1].removesuffix(" px")) < 0.6, "one click of one operator, 0.3 px"
+    mine, his = (float(cell.split(", ")[0]) for cell in cells[2:4])
+    assert his - mine == pytest.approx(0.8, abs=0.4)
+    expect(page.locator("#compare-table tbody tr").filter(has_text="Z₀")).to_be_visible()

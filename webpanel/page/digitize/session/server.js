@@ -114,6 +114,9 @@ export const getNext = (operator) => call("GET", path(session(operator, "/next")
  */
 export const measureTape = (order) => call("POST", path("/tape"), order);
 
+/** @param {string} operator @returns {Promise<import("../types.js").HandCurves>} the newest that are known; newer ones begin */
+export const getCurves = (operator) => call("GET", path(session(operator, "/curves")));
+
 /** @param {string} operator @returns {Promise<import("../types.js").HandResult>} */
 export const compute = (operator) => call("POST", path(session(operator, "/compute")));
 

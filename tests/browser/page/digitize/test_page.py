@@ -8,8 +8,9 @@ from playwright.sync_api import expect
 
 from rig.frame import FrameStatus
 from tests.browser.conftest import Open
-from tests.browser.page.digitize.conftest import Desk, enter
+from tests.browser.page.digitize.conftest import Desk, canvas_of, enter, settled
 from tests.browser.page.test_accessibility import _grave
+from tests.browser.touch import Fingers
 from tests.browser.views import AXE, BROKEN, SMALLEST_TOUCH_PX, TOO_SMALL
 from tests.recorder.logs import ALL_OK
 from tests.support.loopback import Loopback
@@ -84,6 +85,32 @@ def test_a_phone_has_pictures_and_slider_on_one_screen(desk: Desk, open_page: Op
         slider = page.locator("#pulse-slider").bounding_box()
         assert slider is not None
         assert slider["width"] > 300
+
+
+@pytest.mark.parametrize(("width", "height"), [(360, 780), (780, 360)], ids=["upright", "across"])
+def test_on_a_phone_one_picture_is_large_and_a_finger_on_a_small_one_only_enlarges_it(
+    desk: Desk, open_page: Open, width: int, height: int
+) -> None:
+    page = enter(open_page, desk, width=width, height=height, has_touch=True, is_mobile=True)
+    fingers = Fingers(page)
+    expect(page.locator("#view-large")).to_be_hidden()
+    page.locator("#panes").evaluate("panes => panes.scrollIntoView({ block: 'center' })")
+    for tapped, large in (('.pane[data-camera="K1"] .pane-name', "K2"), ('.pane[data-camera="K3"] canvas', "K3")):
+        box = page.locator(tapped).bounding_box()
+        assert box is not None
+        fingers.down((box["x"] + box["width"] / 2, box["y"] + box["height"] / 2))
+        fingers.up()
+        expect(page.locator(f'.pane[data-camera="{large}"]')).to_have_class(re.compile("active"))
+        settled(page)
+        sizes = {camera: canvas_of(page, camera) for camera in ("K1", "K2", "K3")}
+        assert sizes[large]["width"] > 0.6 * width, sizes
+        assert all(sizes[small]["height"] < 0.6 * sizes[large]["height"] for small in sizes if small != large)
+    assert desk.session()["revision"] == 0, "nothing was measured by that"
+    picture = canvas_of(page, "K3")
+    fingers.down((picture["x"] + picture["width"] / 2, picture["y"] + picture["height"] / 2))
+    fingers.up()
+    desk.wait_for(1)
+    assert desk.mark("K3", "P1") is not None
 
 
 @pytest.mark.parametrize(

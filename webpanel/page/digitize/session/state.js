@@ -90,6 +90,20 @@ export function change(news) {
   redraw();
 }
 
+/** A phone, upright or held across: beside each other pictures would be too small to measure in. */
+const PHONE = matchMedia("(max-width: 599px), (max-width: 1199px) and (max-height: 500px)");
+PHONE.addEventListener("change", redraw);
+
+/** Whether this screen has room for large pictures side by side. */
+export function canBeSideBySide() {
+  return !PHONE.matches;
+}
+
+/** Whether one view is large and the others are small. */
+export function oneIsLarge() {
+  return cameras().length > 1 && (state.large || PHONE.matches);
+}
+
 /** Names of the cameras, from left to right. */
 export function cameras() {
   return state.opening?.cameras.map(({ name }) => name) ?? [];

@@ -12,10 +12,10 @@ import { t } from "../../i18n/i18n.js";
 import { make, setText } from "../../shared/dom.js";
 import { number } from "../../shared/format.js";
 import { follow, unfollow } from "../marking/geometry.js";
-import { move, place, select, stroke } from "../marking/marking.js";
+import { move, place, select, stepCamera, stroke } from "../marking/marking.js";
 import { holdTape } from "../marking/tape.js";
 import { said } from "../session/advance.js";
-import { change, fate, FATES, redraw, state, thingOf } from "../session/state.js";
+import { canBeSideBySide, change, fate, FATES, oneIsLarge, redraw, state, thingOf } from "../session/state.js";
 import { frameOf } from "./frames.js";
 import { drawLoupe } from "./loupe.js";
 import { drawOverlay } from "./overlay.js";
@@ -53,6 +53,8 @@ export function makePane({ name, size }, look) {
   let box = [1, 1];
   /** The mark that the hand has taken, and how far from its middle. @type {{ mark: Mark, dx: number, dy: number }|null} */
   let held = null;
+  /** Whether a finger is on a small picture, to make it the large one: it measures nothing. */
+  let chosen = false;
 
   new ResizeObserver(() => {
     const { width, height } = paintedBox(canvas);
@@ -176,11 +178,14 @@ export function makePane({ name, size }, look) {
       unfollow();
     },
     press(at, finger) {
+      chosen = finger && oneIsLarge() && state.camera !== name;
+      if (chosen) return;
       if (state.camera !== name) change({ camera: name, vertex: null });
       held = state.tape ? null : take(at, finger);
       hover(at, finger);
     },
     drag(at, finger) {
+      if (chosen) return;
       hover(at, finger);
       if (!held) return;
       const { mark, dx, dy } = held;
@@ -189,6 +194,7 @@ export function makePane({ name, size }, look) {
       follow(name, mark.thing, xy);
     },
     release(at, begun, path) {
+      if (chosen) return select({ camera: name });
       const [taken, dragged] = [held, state.dragged];
       held = null;
       change({ dragged: null });
@@ -211,8 +217,14 @@ export function makePane({ name, size }, look) {
   return { element, canvas, draw, box: () => box };
 }
 
-/** Make a view the active one, and the large one; the one that is large already gives way to all side by side. @param {string} name */
+/**
+ * Make a view the active one, and the large one; the one that is large already gives way to all side by side, on a phone
+ * to the next one.
+ *
+ * @param {string} name
+ */
 function enlarge(name) {
-  if (state.camera === name) change({ large: !state.large });
-  else select({ camera: name });
+  if (state.camera !== name) select({ camera: name });
+  else if (canBeSideBySide()) change({ large: !state.large });
+  else stepCamera(1);
 }

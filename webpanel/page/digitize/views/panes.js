@@ -7,7 +7,7 @@ import { follow } from "../marking/geometry.js";
 import { place } from "../marking/marking.js";
 import { holdTape } from "../marking/tape.js";
 import { said } from "../session/advance.js";
-import { change, state, thingOf, watch } from "../session/state.js";
+import { canBeSideBySide, change, oneIsLarge, state, thingOf, watch } from "../session/state.js";
 import { fetchFrames } from "./frames.js";
 import { makePane } from "./pane.js";
 import { bounded, moved, toImage, toScreen, whole, zoomed } from "./transform.js";
@@ -39,7 +39,8 @@ export function startPanes() {
 
 function draw() {
   fetchFrames();
-  $("panes").classList.toggle("one", state.large && panes.size > 1);
+  $("panes").classList.toggle("one", oneIsLarge());
+  $("view-large").hidden = !canBeSideBySide();
   for (const name of /** @type {const} */ (["large", "linked", "ghost", "difference"])) {
     $(`view-${name}`).setAttribute("aria-pressed", String(state[name]));
   }

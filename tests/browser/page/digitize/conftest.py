@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -36,11 +37,13 @@ class Desk:
         url: its address.
         log: what is measured.
         client: asks the server what is kept.
+        log_in_panel: its copy among the recordings of the panel.
     """
 
     url: str
     log: HillLog
     client: httpx.Client
+    log_in_panel: Path
 
     def view(self, pulse: int = PULSE, operator: str = OPERATOR) -> dict[str, Any]:
         """What is kept of a pulse."""
@@ -108,10 +111,10 @@ def desk(desk_by_survey: Desk, service: MemoryService, panel: Panel) -> Desk:
 @pytest.fixture
 def desk_by_survey(rendered: HillLog, service: MemoryService, panel: Panel) -> Iterator[Desk]:
     """The rendered jump in the panel; when it is opened first, its cameras are oriented by the survey."""
-    shutil.copy(rendered.path, service.catalogue.directory / "jump.mcap")
+    log = Path(shutil.copy(rendered.path, service.catalogue.directory / "jump.mcap"))
     service.survey = rendered.survey
     with httpx.Client(base_url=f"{panel.url}/api/recordings/jump/digitizing", timeout=20) as client:
-        yield Desk(f"{panel.url}/digitize.html?recording=jump", rendered, client)
+        yield Desk(f"{panel.url}/digitize.html?recording=jump", rendered, client, log)
 
 
 def enter(open_page: Open, desk: Desk, pulse: int = PULSE, operator: str = OPERATOR, **more: Any) -> Page:
@@ -120,6 +123,7 @@ def enter(open_page: Open, desk: Desk, pulse: int = PULSE, operator: str = OPERA
     page.locator("#operator-name").fill(operator)
     page.locator("#operator-submit").click()
     expect(page.locator("#orientation-lamp")).to_have_attribute("data-level", "good")
+    page.keyboard.press("Home")
     for _ in range(pulse - 1):
         page.keyboard.press("w")
     expect(page.locator("#pulse-number")).to_have_text(str(pulse))

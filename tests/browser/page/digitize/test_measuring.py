@@ -11,6 +11,7 @@ from rig.arrays import Floats
 from tests.browser.conftest import Open
 from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, canvas_of, enter, screen, seen, settled
 from tests.browser.touch import Fingers
+from tests.support.waiting import wait_until
 
 #: Colour of the curves that come from K1, as `overlay.js` has it.
 RED = np.array([255, 107, 107])
@@ -222,3 +223,101 @@ def test_a_ski_is_found_more_exactly_in_all_images_at_once(desk: Desk, open_page
     ski = desk.log.truth[PULSE]["skis"]["right"]
     slope = desk.view()["lines"]["right ski"]["slope"]
     assert abs(slope["value"] - np.degrees(np.arcsin(ski["direction"][2]))) < 5 * slope["sigma"]
+
+
+def test_a_pen_measures_and_the_palm_beside_it_does_not(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=820, height=1100, has_touch=True)
+    page.locator("#advance").select_option("stay")
+    page.locator("#view-large").click()  # all side by side: the palm is on another picture
+    settled(page)
+    pen, palm = page.context.new_cdp_session(page), Fingers(page)
+    place, beside = (screen(page, camera, desk.true(camera, "P1")) for camera in ("K1", "K2"))
+
+    def put(kind: str) -> None:
+        where = {"x": float(place[0]), "y": float(place[1]), "button": "left", "clickCount": 1}
+        pen.send("Input.dispatchMouseEvent", {"type": kind, "pointerType": "pen", "force": 0.4, **where})
+
+    palm.down((float(beside[0]), float(beside[1])))
+    put("mousePressed")
+    palm.up()
+    palm.down((float(place[0]) + 30, float(place[1])))
+    put("mouseReleased")
+    palm.up()
+    desk.wait_for(1)
+    settled(page)
+    mark = desk.mark("K1", "P1")
+    assert mark is not None
+    assert np.abs(screen(page, "K1", np.array(mark["xy"])) - place).max() < 0.05
+    assert desk.session()["revision"] == 1, "the palm has measured nothing"
+    palm.down((float(beside[0]), float(beside[1])))  # without a pen it is a finger again
+    palm.up()
+    desk.wait_for(2)
+    assert desk.mark("K2", "P1") is not None
+
+
+def test_one_key_goes_to_the_worst_ray_the_next_open_place_and_where_a_click_helps_most(
+    desk: Desk, open_page: Open
+) -> None:
+    for camera in ("K1", "K2", "K3"):
+        for thing in ("P1", "P2", "P3", "P4"):
+            if (camera, thing) != ("K3", "P2"):
+                wrong = np.array([3.0, 12.0]) * ((camera, thing) == ("K2", "P3"))
+                desk.place(camera, thing, desk.true(camera, thing) + wrong)
+    page = enter(open_page, desk, width=1500, height=1000)
+    page.keyboard.press("Home")
+    page.keyboard.press("5")
+    expect(_thing(page, "P3")).to_have_attribute("aria-pressed", "true")
+    expect(page.locator('.pane[data-camera="K2"]')).to_have_class(re.compile("active"))
+    expect(page.locator("#pulse-number")).to_have_text(str(PULSE))
+    page.keyboard.press("t")
+    expect(_thing(page, "right ski")).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("t")
+    page.keyboard.press("t")
+    expect(page.locator('.pane[data-camera="K3"]')).to_have_class(re.compile("active"))
+    expect(_thing(page, "P2")).to_have_attribute("aria-pressed", "true")
+    wanted = desk.client.get(f"/sessions/{OPERATOR}/next").json()
+    page.keyboard.press("Home")
+    page.keyboard.press("f")
+    expect(page.locator("#snacks")).to_contain_text(wanted["why"])
+    expect(_thing(page, wanted["thing"])).to_have_attribute("aria-pressed", "true")
+    expect(page.locator(f'.pane[data-camera="{wanted["camera"]}"]')).to_have_class(re.compile("active"))
+    expect(page.locator("#pulse-number")).to_have_text(str(wanted["pulse"]))
+
+
+def test_the_pulse_before_stays_in_sight_as_a_ghost(desk: Desk, open_page: Open) -> None:
+    desk.place("K1", "P1", desk.true("K1", "P1"))
+    page = enter(open_page, desk, PULSE + 1, width=1500, height=1000)
+    page.mouse.move(5, 5)
+    at = screen(page, "K1", desk.true("K1", "P1"))
+    settled(page)
+    with_ghost = seen(page, at, (12, 12))
+    page.keyboard.press("o")
+    expect(page.locator("#view-ghost")).to_have_attribute("aria-pressed", "false")
+    settled(page)
+    assert np.ptp(seen(page, at, (12, 12)), axis=2).max() <= 1, "grey"
+    assert np.ptp(with_ghost, axis=2).max() > 40, "the colour of the helmet's mark"
+    assert desk.mark("K1", "P1", PULSE + 1) is None
+
+
+def test_what_was_measured_automatically_is_taken_over_by_one_key_and_never_redone(desk: Desk, open_page: Open) -> None:
+    for camera in ("K1", "K2", "K3"):
+        for thing in ("P1", "P2"):
+            desk.place(camera, thing, desk.true(camera, thing))
+    found = desk.client.get(f"/sessions/{OPERATOR}/export/measurements.json")
+    measured = desk.log_in_panel.with_suffix(".measured")
+    measured.mkdir()
+    (measured / "measurements.json").write_bytes(found.content)
+    page = enter(open_page, desk, operator="Bo", width=1500, height=1000)
+    expect(page.locator('[data-of="P1"]')).to_contain_text("controlled")  # it counts without a click
+    page.locator("#advance").select_option("view")
+    page.mouse.click(*screen(page, "K2", np.add(desk.true("K2", "P1"), (2, 0))))
+    wait_until(lambda: desk.session("Bo")["revision"] == 1, "his own click is kept", 20)
+    page.keyboard.press("Shift+R")
+    wait_until(lambda: desk.session("Bo")["revision"] == 6, "the rest is taken over", 20)
+    marks = desk.view(operator="Bo")["marks"]
+    sources = {(camera, thing): mark["source"] for camera, of in marks.items() for thing, mark in of.items()}
+    assert sources.pop(("K2", "P1")) == "hand"
+    assert set(sources.values()) == {"automatic"}
+    assert len(sources) == 5
+    for camera, thing in sources:
+        assert np.abs(np.array(marks[camera][thing]["xy"]) - desk.true(camera, thing)).max() < 1e-3

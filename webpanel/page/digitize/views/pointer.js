@@ -2,7 +2,7 @@
  * Mouse, pen and fingers on the picture of a camera.
  *
  * One finger, the pen or the left button measures; two fingers, the middle button, or the left one while the space key is
- * held move the picture; wheel and two fingers zoom.
+ * held move the picture; wheel and two fingers zoom. While a pen is down, fingers do nothing: a palm rests beside it.
  *
  * @typedef {[number, number]} Place CSS px in the canvas
  * @typedef {object} Hand
@@ -24,6 +24,10 @@ let spaceHeld = false;
 addEventListener("keydown", (event) => { if (event.key === " ") spaceHeld = true; });
 addEventListener("keyup", (event) => { if (event.key === " ") spaceHeld = false; });
 addEventListener("blur", () => { spaceHeld = false; });
+/** The pen that is down, in whatever picture. @type {number|null} */
+let pen = null;
+/** How often one was put down. */
+let pens = 0;
 
 /**
  * Where an element is painted, CSS px: on whole pixels of the screen, where the layout has parts of them.
@@ -43,7 +47,7 @@ export function paintedBox(element) {
 export function watchPointer(canvas, hand) {
   /** @type {Map<number, Place>} */
   const down = new Map();
-  /** @type {{ begun: Place, path: Place[], dragging: boolean }|null} */
+  /** Before so many pens. @type {{ begun: Place, path: Place[], dragging: boolean, before: number }|null} */
   let measuring = null;
 
   /** @param {MouseEvent} event @returns {Place} */
@@ -52,11 +56,23 @@ export function watchPointer(canvas, hand) {
     return [event.clientX - left, event.clientY - top];
   }
 
+  /** @param {PointerEvent} event @returns {boolean} whether it was one of those that count */
+  function lifted(event) {
+    if (event.pointerId === pen) pen = null;
+    return down.delete(event.pointerId);
+  }
+
   canvas.addEventListener("pointerdown", (event) => {
     const at = placeOf(event);
     const moving = event.button === 1 || spaceHeld;
-    if (!moving && event.button !== 0) return;
+    if (!moving && event.button !== 0 || pen !== null) return;
     event.preventDefault();
+    if (event.pointerType === "pen") {
+      pen = event.pointerId;
+      pens += 1;
+      if (measuring) hand.cancel();
+      down.clear(); // the palm may have come first
+    }
     canvas.focus({ preventScroll: true });
     canvas.setPointerCapture(event.pointerId);
     down.set(event.pointerId, at);
@@ -65,7 +81,7 @@ export function watchPointer(canvas, hand) {
       measuring = null;
       return;
     }
-    measuring = { begun: at, path: [at], dragging: false };
+    measuring = { begun: at, path: [at], dragging: false, before: pens };
     hand.press(at, event.pointerType === "touch");
   });
 
@@ -90,16 +106,16 @@ export function watchPointer(canvas, hand) {
   });
 
   canvas.addEventListener("pointerup", (event) => {
-    down.delete(event.pointerId);
-    if (!measuring) return;
-    const { begun, path, dragging } = measuring;
+    if (!lifted(event) || !measuring) return;
+    const { begun, path, dragging, before } = measuring;
     measuring = null;
+    if (before !== pens) return hand.cancel(); // it is a palm in another picture
     hand.release(dragging ? placeOf(event) : begun, begun, dragging ? path : [begun]);
     if (event.pointerType === "touch") hand.leave();
   });
 
   canvas.addEventListener("pointercancel", (event) => {
-    down.delete(event.pointerId);
+    if (!lifted(event)) return;
     measuring = null;
     hand.cancel();
   });

@@ -1,9 +1,9 @@
 """Measuring by hand: what a person marks in the images of a recording, and what follows from it in space."""
 
 from enum import StrEnum
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from rig.api.fields import WHOLE, Model
 from rig.api.measuring import MeasuringStep
@@ -301,13 +301,23 @@ class RefineOrder(Model):
     camera: Name
     x: Pixel
     y: Pixel
-    kind: Literal["disc", "dark disc", "edge"]
+    end: Place | None = Field(None, description='where a line ends that was drawn from there, px; for "line" only')
+    kind: Literal["disc", "dark disc", "edge", "line"]
+
+    @model_validator(mode="after")
+    def _ends(self) -> Self:
+        if (self.kind == "line") != (self.end is not None):
+            raise ValueError('"line" has an "end", and nothing else has: give both or neither')
+        if self.end is not None and self.end == (self.x, self.y):
+            raise ValueError("the line has no length: draw it longer")
+        return self
 
 
 class Refined(Model):
     """A place found in the image, px."""
 
     xy: Place
+    end: Place | None = Field(None, description="of a line another place on it, whose error is independent")
     sigma: Sigmas
     kind: str
 

@@ -1,4 +1,4 @@
-"""Refines clicks on an edge to their feet on it."""
+"""Refines clicks on an edge to their feet on it, and lines that were drawn along an edge or a bar."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -25,6 +25,7 @@ from rig.phrase import Phrase, phrase
 
 _EDGE_HALF = 5.0  # px along an edge that are fitted, to either side
 _WIDTHS = (1.5, 2.5, 4.0)  # px to the other edge of a bar, to start from
+_REACH = NEAR_PX + max(_WIDTHS) + REACH_PX  # px beside a line that are looked at
 _WORST_PX = 1.0  # sigma of a border
 _NONE_NEAR: Final = phrase("hand_edge_none_near", "nothing straight within 4 px of the click")
 
@@ -44,6 +45,19 @@ class RefinedEdge:
     direction: Floats
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RefinedLine:
+    """A line in an image.
+
+    Attributes:
+        xy: (2, 2) px, two points of it whose errors are independent.
+        sigma: standard deviation of each across the line, px.
+    """
+
+    xy: Floats
+    sigma: float
+
+
 def refine_edge(image: Grey, xy: Floats, direction: Floats | None = None) -> RefinedEdge:
     """The edge at a click.
 
@@ -59,11 +73,51 @@ def refine_edge(image: Grey, xy: Floats, direction: Floats | None = None) -> Ref
     noise = noise_around(image, xy)
     along = _direction(image, xy) if direction is None else np.asarray(direction, float)
     along = along / np.hypot(*along)
-    pixels = strip(image, xy - _EDGE_HALF * along, xy + _EDGE_HALF * along, NEAR_PX + max(_WIDTHS) + REACH_PX)
+    pixels = strip(image, xy - _EDGE_HALF * along, xy + _EDGE_HALF * along, _REACH)
+    return _foot(pixels, *min(_sound(pixels, noise), key=lambda each: _off(*each)), xy)
+
+
+def refine_line(image: Grey, start: Floats, end: Floats) -> RefinedLine:
+    """The edge along a line that was drawn, or the axis of a thin bar.
+
+    All of the line is fitted at once: feet of several clicks may lie on different edges of a bar.
+
+    Args:
+        image: (rows, columns) grey values.
+        start: (2,) where the line begins, px: at most `NEAR_PX` beside the edge.
+        end: (2,) where it ends, likewise.
+
+    Raises:
+        NoFitError: there is no straight edge; the message says why.
+    """
+    start, end = inside(image, start), inside(image, end)
+    pixels = strip(image, start, end, _REACH)
+    sound = _sound(pixels, noise_around(image, (start + end) / 2), bar_first=True)
+    borders, k = min(sound, key=lambda each: _off(*each))
+    # Of a bar both, of an edge that one.
+    chosen = np.eye(2 * len(borders.ends))[2 * k : 2 * k + 2]
+    if len(borders.ends) == 2:
+        chosen = np.tile(np.eye(2), 2) / 2
+    at_ends, covariance = chosen @ borders.ends.ravel(), chosen @ borders.covariance @ chosen.T
+    turn = covariance[0, 0] + covariance[1, 1] - 2 * covariance[0, 1]
+    middle = (covariance[0, 0] - covariance[0, 1]) / turn
+    variance = float(covariance[0, 0] - middle**2 * turn)
+    places = middle + np.array((-1, 1)) * np.sqrt(variance / turn)  # where the errors are independent
+    u = at_ends[0] + places * (at_ends[1] - at_ends[0])
+    return RefinedLine(pixels.point(places, u), float(np.sqrt(2 * variance)))
+
+
+def _sound(pixels: Strip, noise: float, *, bar_first: bool = False) -> list[tuple[Borders, int]]:
+    """Borders near a line that hold, and which of theirs; a bar rather than one of its edges, or that if it is alone.
+
+    Raises:
+        NoFitError: none does; the message says why.
+    """
     reason = _NONE_NEAR
     for u in sorted(_steps(pixels), key=abs):
         pairs = [np.sort((u, u + aside))[:, None] * (1.0, 1.0) for width in _WIDTHS for aside in (-width, width)]
-        for starts in ([np.full((1, 2), u)], pairs):  # a thin bar has another edge beside this one
+        edge = [np.full((1, 2), u)]  # a thin bar has another one beside it
+        for starts in (pairs, edge) if bar_first else (edge, pairs):
             fitted = [borders for start in starts if (borders := fit_borders(pixels, start, noise)) is not None]
             found = [
                 (borders, k) for borders in fitted for k in range(len(borders.ends)) if _off(borders, k) <= NEAR_PX
@@ -71,7 +125,7 @@ def refine_edge(image: Grey, xy: Floats, direction: Floats | None = None) -> Ref
             reasons = [_why_poor(borders, noise) for borders, _ in found]
             sound = [each for each, why in zip(found, reasons, strict=True) if why is None]
             if sound:
-                return _foot(pixels, *min(sound, key=lambda each: _off(*each)), xy)
+                return sound
             reason = next((why for why in reasons if why is not None), reason)
     text = "no edge here: {why}; click nearer to it, or measure by hand"
     raise NoFitError(phrase("hand_no_edge", text, why=reason))

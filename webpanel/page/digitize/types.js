@@ -138,6 +138,7 @@
  *
  * @typedef {object} Refined
  * @property {Place} xy
+ * @property {Place|null} end
  * @property {[number, number]} sigma
  * @property {string} kind
  * @typedef {object} Tracking

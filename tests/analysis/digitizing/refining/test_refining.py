@@ -5,7 +5,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from analysis.digitizing.refining.refining import refine_disc, refine_edge
+from analysis.digitizing.refining.refining import refine_disc, refine_edge, refine_line
 from rig.arrays import Floats
 from rig.errors import NoFitError
 from tests.analysis.digitizing.refining.drawing import bar, disc, drawn, edge, noisy, textured
@@ -68,6 +68,23 @@ def test_a_click_at_an_edge_of_a_thin_bar_finds_that_edge() -> None:
     assert 0.8 < _rms(errors) < 1.2
 
 
+@pytest.mark.parametrize("half", [0.0, 1.5, 2.5])
+def test_a_line_that_was_drawn_finds_the_edge_or_the_axis_of_the_bar(half: float) -> None:
+    """The hand is a pixel or two beside it at either end; 0: an edge."""
+    rng = np.random.default_rng(int(10 * half))
+    errors = []
+    for _ in range(ROUNDS):
+        place, angle = rng.uniform(28, 36, 2), rng.uniform(0, np.pi)
+        scene = bar(place, angle, half, (60, 200, 90)) if half else edge(place, angle, (60.0, 200.0))
+        along = np.array((np.cos(angle), np.sin(angle)))
+        drawn_ends = [place + s * along + rng.uniform(-1, 1) * _across(angle) for s in (-14, 14)]
+        found = refine_line(drawn(scene, SIZE, rng), *drawn_ends)
+        errors += ((found.xy - place) @ _across(angle) / found.sigma).tolist()
+        assert 5 < np.hypot(*(found.xy[1] - found.xy[0])) < 28
+    assert 0.8 < _rms(errors) < 1.2
+    assert abs(np.corrcoef(errors[::2], errors[1::2])[0, 1]) < 4 / np.sqrt(ROUNDS)
+
+
 @pytest.mark.parametrize("make", [noisy, textured])
 def test_noise_and_texture_are_no_discs(make: type) -> None:
     rng = np.random.default_rng(8)
@@ -85,6 +102,8 @@ def test_noise_holds_no_edge() -> None:
     for _ in range(12):
         with pytest.raises(NoFitError, match="no edge here"):
             refine_edge(noisy(SIZE, rng), MIDDLE)
+        with pytest.raises(NoFitError, match="no edge here"):
+            refine_line(noisy(SIZE, rng), MIDDLE - 12, np.add(MIDDLE, (12, 5)))
 
 
 def test_a_bar_is_no_disc() -> None:

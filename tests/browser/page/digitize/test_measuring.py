@@ -8,6 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.arrays import Floats
+from tests.analysis.simulated import SIZE
 from tests.browser.conftest import Open
 from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, canvas_of, enter, screen, seen, settled
 from tests.browser.touch import Fingers
@@ -321,3 +322,72 @@ def test_what_was_measured_automatically_is_taken_over_by_one_key_and_never_redo
     assert len(sources) == 5
     for camera, thing in sources:
         assert np.abs(np.array(marks[camera][thing]["xy"]) - desk.true(camera, thing)).max() < 1e-3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("hand", ["mouse", "finger"])
+def test_a_ski_that_is_drawn_in_two_images_is_found_in_all(desk: Desk, open_page: Open, hand: str) -> None:
+    """The hand shakes by a pixel or two. What it drew stands until two images have the ski."""
+    touch: dict[str, Any] = {"has_touch": True, "is_mobile": True} if hand == "finger" else {}
+    page = enter(open_page, desk, width=1366, height=1024, **touch)
+    page.locator("#loupe").select_option("0")
+    for camera in ("K1", "K2"):
+        page.locator(f'.pane[data-camera="{camera}"] .pane-name').click() if camera != "K1" else None
+        _thing(page, "right ski").click()
+        expect(page.locator(f'.pane[data-camera="{camera}"]')).to_have_class(re.compile("active"))
+        _draw(page, camera, _ends(desk, camera), hand)
+        if camera == "K1":
+            expect(_signs_of(page, "right ski", 0)).to_have_attribute("data-letter", re.compile("[mr]"))
+            line = desk.mark("K1", "right ski")
+            assert line is not None
+            assert all(_beside(desk, "K1", vertex["xy"]) < 2.5 for vertex in line["vertices"])
+            if line["vertices"][0]["source"] == "hand":  # no edge was sure: nothing better than a hand is said
+                assert {vertex["sigma"] for vertex in line["vertices"]} == {None}
+    expect(page.locator("#track-said li")).to_contain_text("it was refined", timeout=60_000)
+    expect(_thing(page, "right ski").locator('.sign:is([data-letter="r"], [data-letter="t"])')).to_have_count(3)
+    ski = desk.log.truth[PULSE]["skis"]["right"]
+    slope = desk.view()["lines"]["right ski"]["slope"]
+    assert abs(slope["value"] - np.degrees(np.arcsin(ski["direction"][2]))) < 5 * slope["sigma"]
+
+
+def _signs_of(page: Page, thing: str, image: int) -> Any:
+    return _thing(page, thing).locator(".sign").nth(image)
+
+
+def _ends(desk: Desk, camera: str) -> list[Floats]:
+    ski = desk.log.truth[PULSE]["skis"]["right"]
+    return [desk.image(camera, np.array(ski["point"]) + s * np.array(ski["direction"])) for s in (-0.9, 0.9)]
+
+
+def _beside(desk: Desk, camera: str, place: list[float]) -> float:
+    """How far a place is beside the axis of the right ski, px."""
+    first, last = _ends(desk, camera)
+    along = (last - first) / np.hypot(*(last - first))
+    return float(abs((np.array(place) - first) @ (-along[1], along[0])))
+
+
+def _draw(page: Page, camera: str, ends: list[Floats], hand: str) -> None:
+    """Draw from one place of an image to another, enlarged."""
+    middle = (ends[0] + ends[1]) / 2
+    at = np.round(screen(page, camera, middle))
+    page.mouse.move(*at)
+    before = page.locator(".pane.active .pane-where").inner_text()
+    page.mouse.wheel(0, -800)
+    expect(page.locator(".pane.active .pane-where")).not_to_have_text(before)
+    box = canvas_of(page, camera)
+    scale = min(box["width"] / SIZE[0], box["height"] / SIZE[1]) * np.exp(0.0018 * 800)
+    first, last = (at + (end - middle) * scale for end in ends)
+    way = [first + k / 12 * (last - first) + (0, 1.5 * scale / 5 * (-1) ** k) for k in range(13)]
+    places = [(float(x), float(y)) for x, y in way]
+    if hand == "mouse":
+        page.mouse.move(*places[0])
+        page.mouse.down()
+        for place in places[1:]:
+            page.mouse.move(*place)
+        page.mouse.up()
+    else:
+        fingers = Fingers(page)
+        fingers.down(places[0])
+        for place in places[1:]:
+            fingers.move(place)
+        fingers.up()

@@ -6,7 +6,7 @@ import { attempt, tell } from "../../shared/snacks.js";
 import { refineTarget, select, target } from "../marking/marking.js";
 import { said } from "../session/advance.js";
 import { cancelTracking, getTracking, track } from "../session/server.js";
-import { reloadAll } from "../session/session.js";
+import { reloadAll, sent } from "../session/session.js";
 import { cameras, change, indexOf, listed, state, thingOf, watch } from "../session/state.js";
 import { titleOf } from "./things.js";
 
@@ -28,7 +28,21 @@ export function startTracking() {
   watch(() => {
     for (const part of ["track-back", "track-on"]) $(part).disabled = state.busy !== "";
     if (state.operator && looking !== state.operator) void look(state.operator); // one may be under way since before
+    if (state.drawn && !state.busy) void refineDrawn(state.drawn);
   });
+}
+
+/**
+ * Find a line that was drawn in all images at once, if two or more of oriented cameras have it.
+ *
+ * @param {{ thing: string, pulse: number }} drawn
+ */
+async function refineDrawn({ thing, pulse }) {
+  change({ drawn: null });
+  const oriented = state.opening?.cameras.filter((camera) => camera.oriented) ?? [];
+  if (pulse !== state.pulse || oriented.filter(({ name }) => said(state.view, name, thing)?.state === "measured").length < 2) return;
+  await sent();
+  await inAllImages(thing, pulse);
 }
 
 /** The things that are followed: the selected one, or all that are measured in this pulse. */
@@ -55,7 +69,12 @@ export async function refineHere() {
   const asOne = thing && thingOf(thing)?.kind === "line" && state.opening?.cameras.some((camera) => camera.oriented);
   if (!asOne) return refineTarget();
   if (state.busy || !state.operator) return;
-  const found = await begin({ things: [thing], pulse: state.pulse, direction: 1, most: 0 });
+  await inAllImages(thing, state.pulse);
+}
+
+/** @param {string} thing a line that is marked @param {number} pulse */
+async function inAllImages(thing, pulse) {
+  const found = await begin({ things: [thing], pulse, direction: 1, most: 0 });
   if (found?.state === "done" && !found.tracked[thing]?.length) tell("info", say(found.stopped[thing]).text);
 }
 

@@ -107,7 +107,8 @@ export function move(mark, xy) {
 }
 
 /**
- * Draw along an edge: points of a line at equal distances, each where the image has the edge, if it has one there.
+ * Draw a line along an edge or a thin bar: two points where the image has it, else points of the hand at equal distances.
+ * It takes the place of what was measured of the line. Where others show it too, it is then found in all images at once.
  *
  * @param {string} camera
  * @param {Place[]} path
@@ -115,16 +116,17 @@ export function move(mark, xy) {
 export async function stroke(camera, path) {
   const [first, end] = [path[0], path[path.length - 1]];
   const { thing, pulse } = state;
-  const places = Array.from({ length: LINE_POINTS }, (_, index) => {
+  const found = await onLine(camera, first, end);
+  if (state.pulse !== pulse || state.thing !== thing) return;
+  const byHand = Array.from({ length: LINE_POINTS }, (_, index) => {
     const share = index / (LINE_POINTS - 1);
     return path.reduce((best, one) => away(one, first, end, share) < away(best, first, end, share) ? one : best);
   });
-  for (const xy of places) {
-    if (state.pulse !== pulse) return;
-    const found = await onEdge(camera, xy);
-    void put({ camera, thing, vertex: null }, found ? { xy: found.xy, sigma: found.sigma, source: "refined" } : { xy });
-  }
+  if (said(state.view, camera, thing)) void send({ do: "remove", pulse, camera, thing, vertex: null });
+  if (found?.end) for (const xy of [found.xy, found.end]) void put({ camera, thing, vertex: null }, { xy, sigma: found.sigma, source: "refined" });
+  else for (const xy of byHand) void put({ camera, thing, vertex: null }, { xy });
   goOn(camera);
+  change({ drawn: { thing, pulse } });
 }
 
 /** @param {Place} one @param {Place} first @param {Place} end @param {number} share of the way */
@@ -132,12 +134,12 @@ function away(one, first, end, share) {
   return Math.hypot(one[0] - first[0] - share * (end[0] - first[0]), one[1] - first[1] - share * (end[1] - first[1]));
 }
 
-/** @param {string} camera @param {Place} xy */
-async function onEdge(camera, [x, y]) {
+/** @param {string} camera @param {Place} begin @param {Place} end */
+async function onLine(camera, [x, y], end) {
   try {
-    return await refine({ pulse: state.pulse, camera, x, y, kind: "edge" });
+    return await refine({ pulse: state.pulse, camera, x, y, end, kind: "line" });
   } catch (error) {
-    if (error instanceof Problem && error.status === 422) return null; // no edge there: the hand's place stays
+    if (error instanceof Problem && error.status === 422) return null; // no edge there: the hand's places stay
     throw error;
   }
 }

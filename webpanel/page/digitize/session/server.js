@@ -85,7 +85,7 @@ export function getGeometry(operator, { pulse, camera, thing }, [x, y]) {
 }
 
 /**
- * @param {{ pulse: number, camera: string, x: number, y: number, kind: "disc"|"dark disc"|"edge" }} order
+ * @param {{ pulse: number, camera: string, x: number, y: number, end?: Place, kind: "disc"|"dark disc"|"edge"|"line" }} order
  * @returns {Promise<import("../types.js").Refined>}
  */
 export const refine = (order) => call("POST", path("/refine"), order);

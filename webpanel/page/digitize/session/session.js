@@ -107,6 +107,11 @@ export function send(action) {
   return answered;
 }
 
+/** Resolves when all that was done is kept. */
+export async function sent() {
+  await queue;
+}
+
 /**
  * @param {string} operator
  * @param {Action} action

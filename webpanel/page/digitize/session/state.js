@@ -34,6 +34,7 @@
  * @property {{ camera: string, thing: string, vertex: number|null, xy: Place }|null} dragged
  * @property {{ camera: string, geometry: import("../types.js").Geometry }|null} live what the place of the pointer means
  * @property {Record<string, Record<string, import("../types.js").Curve>>} curves of the marks of the thing: by camera of the mark, then of the curve
+ * @property {{ thing: string, pulse: number }|null} drawn the line that was drawn last, which is to be found in all images
  * @property {Tape|null} tape
  * @property {boolean} playing
  * @property {string} busy what the service is doing for long: key of the words; "": nothing
@@ -51,7 +52,7 @@ const KEPT = /** @type {const} */ (["advance", "large", "linked", "ghost", "loup
 export const state = {
   opening: null, operator: "", session: null, view: null, pulse: 0, camera: "", thing: "", vertex: null, group: "jumper",
   advance: "point", guess: false, large: matchMedia("(max-width: 1599px)").matches, linked: false, ghost: true, difference: false, loupe: 8,
-  tone: PLAIN, lenses: {}, hover: null, dragged: null, live: null, curves: {}, tape: null, playing: false, busy: "", cut: false,
+  tone: PLAIN, lenses: {}, hover: null, dragged: null, live: null, curves: {}, drawn: null, tape: null, playing: false, busy: "", cut: false,
   ...load("digitize", {}),
 };
 

@@ -15,7 +15,6 @@ from scipy.special import chdtri
 from analysis.measurements.model import POINTS, JumpMeasurements, MeasuredCamera, Measurements, PulseMeasurements
 from analysis.motion.adjustment.bundle import Model, begun, near, root_of, settled
 from analysis.motion.adjustment.gross_errors import without_gross_errors
-from analysis.motion.model.camera_arrays import CameraArrays, own_root
 from analysis.motion.model.channels import CHANNELS, ORIGIN, SLOPE, VECTORS, MotionFrame
 from analysis.motion.model.equations import linearised
 from analysis.motion.model.observations import GROUPS, Observations, by_hand, observations, used_cameras
@@ -23,6 +22,7 @@ from analysis.motion.model.prior import SHARE, STATE, prior, start_densities, tr
 from analysis.motion.quantities import known_groups, smoothed_states
 from analysis.motion.start_values import start_values
 from analysis.result.model import SmoothedState
+from analysis.scene.camera_arrays import CameraArrays, own_root
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Flags, Floats
 from rig.clocks import NS_PER_S, UtcNs

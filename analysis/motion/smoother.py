@@ -19,7 +19,6 @@ from analysis.motion.adjustment.bundle import (
 )
 from analysis.motion.adjustment.gross_errors import fitting_sigmas, statistics, with_factors, without_gross_errors
 from analysis.motion.adjustment.lasting import lasting_covariance
-from analysis.motion.model.camera_arrays import CameraArrays, own_root
 from analysis.motion.model.observations import GROUPS, Observations, by_hand, observations, used_cameras
 from analysis.motion.model.prior import Prior, prior, re_estimated, start_densities
 from analysis.motion.quantities import known_groups, smoothed_states
@@ -28,6 +27,7 @@ from analysis.motion.synchrony import Synchrony, judged
 from analysis.motion.table import TableMotion, table_motion
 from analysis.motion.takeoff import Break, airborne, find_break, passing
 from analysis.result.model import CameraOffset, Phase, RayTest, SmoothedState, TakeOff, phase_at
+from analysis.scene.camera_arrays import CameraArrays, own_root
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Floats
 from rig.clocks import NS_PER_S, UtcNs

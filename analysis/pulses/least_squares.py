@@ -161,14 +161,15 @@ def _vague(objects: Objects, state: Floats, solution: _Solution, calibration: Fl
     covariance = np.nan_to_num(solution.cofactors / reach[:, :, None] / reach[:, None, :])
     values, vectors = np.linalg.eigh(covariance)
     sigma = np.sqrt(np.maximum(values[:, -1], 0.0))
-    steady = sigma < _LARGEST_SIGMA
-    for sigmas in (-_LINEAR_WITHIN, _LINEAR_WITHIN):
-        step = sigmas * sigma[:, None] * vectors[:, :, -1] * reach
-        there = objects.moved(state, step)
-        change = np.einsum("nru,nu->nr", solution.design, step).reshape(*seen.shape, 2)
-        equations = objects.equations(there)
-        rest = _solve(replace(equations, v=equations.v - change), calibration, seen).step / reach
-        steady &= np.linalg.norm(rest, axis=1) < _NOT_LINEAR * sigma
+    far = np.repeat((-_LINEAR_WITHIN, _LINEAR_WITHIN), len(state))
+    twice = np.tile(np.arange(len(state)), 2)
+    step = (far * sigma[twice])[:, None] * (vectors[:, :, -1] * reach)[twice]
+    there = objects.subset(twice)
+    change = (solution.design[twice] @ step[..., None]).reshape(-1, seen.shape[1], 2)
+    equations = there.equations(there.moved(state[twice], step))
+    rest = _solve(replace(equations, v=equations.v - change), calibration, seen[twice]).step / reach[twice]
+    linear = np.linalg.norm(rest, axis=1) < _NOT_LINEAR * sigma[twice]
+    steady = (sigma < _LARGEST_SIGMA) & linear.reshape(2, -1).all(axis=0)
     return np.asarray(~steady)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.measurements.model import POINTS, PulseMeasurements, Source
 from analysis.pulses.least_squares import Equations
+from analysis.scene.camera_arrays import stacked
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from rig.arrays import Flags, Floats, Integers
 
@@ -35,29 +36,27 @@ class Points:
 
     def start(self, seen: Flags) -> Floats:
         """The points (n, 3) with the least square sum of distances from the rays."""
-        across, target = np.zeros((len(seen), 3, 3)), np.zeros((len(seen), 3))
-        centroid = np.mean([camera.position for camera in self.cameras], axis=0)
-        for image, camera in enumerate(self.cameras):
-            ray = rays(camera, self.xy[:, image])
-            projector = np.eye(3) - ray[:, :, None] * ray[:, None, :]
-            projector = np.where(seen[:, image, None, None] & np.isfinite(projector), projector, 0.0)
-            across += projector
-            target += np.einsum("nij,nj->ni", projector, camera.position - centroid - self.shift[:, image])
-        return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(across), target) + centroid)
+        n, m = seen.shape
+        cameras, _ = stacked(tuple(self.cameras), self.parameters)
+        ray = cameras.in_turn(n).rays(self.xy.reshape(-1, 2)).reshape(n, m, 3)
+        centroid = cameras.position.mean(axis=0)
+        projector = np.eye(3) - ray[..., :, None] * ray[..., None, :]
+        projector = np.where((seen & np.isfinite(ray).all(axis=2))[..., None, None], projector, 0.0)
+        target = (projector @ (cameras.position - centroid - self.shift)[..., None]).sum(axis=1)
+        return np.asarray((np.linalg.pinv(projector.sum(axis=1)) @ target)[..., 0] + centroid)
 
     def equations(self, state: Floats) -> Equations:
         """Collinearity equations (A1)."""
-        parts = [camera.linearised(state + self.shift[:, i], self.xy[:, i]) for i, camera in enumerate(self.cameras)]
         n, m = self.seen.shape
-        by_calibration = np.zeros((n, m, 2, self.parameters))
-        for image, (camera, part) in enumerate(zip(self.cameras, parts, strict=True)):
-            by_calibration[:, image, :, camera.columns] = np.moveaxis(part[2], -1, 0)
+        cameras, own = stacked(tuple(self.cameras), self.parameters)
+        places = (state[:, None] + self.shift).reshape(-1, 3)
+        v, by_point, by_own, before = cameras.in_turn(n).equations(places, self.xy.reshape(-1, 2))
         return Equations(
-            np.stack([part[0] for part in parts], axis=1),
-            np.stack([part[1] for part in parts], axis=1),
-            by_calibration,
+            v.reshape(n, m, 2),
+            by_point.reshape(n, m, 2, 3),
+            by_own.reshape(n, m, 2, by_own.shape[-1]) @ own,
             self.covariance,
-            np.stack([camera.in_front(state) for camera in self.cameras], axis=1),
+            before.reshape(n, m),
         )
 
     def moved(self, state: Floats, step: Floats) -> Floats:
@@ -121,5 +120,5 @@ def rays(camera: PlacedCamera, xy: Floats) -> Floats:
 
 def nearest(cameras: Sequence[PlacedCamera], points: Floats, seen: Flags) -> Floats:
     """Distances (n,) of points (n, 3) from the nearest camera that saw them; infinite where none did."""
-    away = np.stack([np.linalg.norm(points - camera.position, axis=1) for camera in cameras], axis=1)
+    away = np.linalg.norm(points[:, None] - np.array([camera.position for camera in cameras]), axis=2)
     return np.asarray(np.where(seen, away, np.inf).min(axis=1))

@@ -12,7 +12,8 @@ import numpy as np
 
 from analysis.measurements.model import SIDES, PulseMeasurements, Source
 from analysis.pulses.least_squares import Equations
-from analysis.pulses.points import nearest, rays
+from analysis.pulses.points import nearest
+from analysis.scene.camera_arrays import stacked
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.rotation import cross
 from rig.arrays import Flags, Floats, Integers
@@ -49,19 +50,15 @@ class SkiLines:
     def start(self, seen: Flags) -> Floats:
         """Lines that meet the planes through projection centres and image lines best (C.3)."""
         n = len(seen)
-        centroid = np.mean([camera.position for camera in self.cameras], axis=0)
-        scatter, target = np.zeros((n, 3, 3)), np.zeros((n, 3))
-        sight, start = np.zeros((n, 3)), np.zeros((n, 3))
-        for image, camera in reversed(list(enumerate(self.cameras))):
-            here = seen[:, image]
-            ray = np.where(self.weight[:, image, :, None] > 0, self.ray[:, image], 0.0)
-            normal = np.linalg.eigh(np.swapaxes(ray, 1, 2) @ ray)[1][:, :, 0]
-            normal = np.where(here[:, None], normal, 0.0)
-            centre = camera.position - centroid - self.shift[:, image]
-            scatter += normal[:, :, None] * normal[:, None, :]
-            target += normal * (normal * centre).sum(axis=1, keepdims=True)
-            sight = np.where(here[:, None], ray.sum(axis=1), sight)
-            start = np.where(here[:, None], centre, start)
+        position = np.array([camera.position for camera in self.cameras])
+        centroid = position.mean(axis=0)
+        ray = np.where(self.weight[..., None] > 0, self.ray, 0.0)
+        normal = np.where(seen[..., None], np.linalg.eigh(np.swapaxes(ray, 2, 3) @ ray)[1][..., 0], 0.0)
+        centre = position - centroid - self.shift
+        scatter = np.swapaxes(normal, 1, 2) @ normal
+        target = (normal * (normal * centre).sum(axis=2, keepdims=True)).sum(axis=1)
+        first = seen.argmax(axis=1)
+        start, sight = centre[np.arange(n), first], ray[np.arange(n), first].sum(axis=1)
         values, vectors = np.linalg.eigh(scatter)
         direction, planes = vectors[:, :, 0], vectors[:, :, 1:]
         within = np.where(values[:, 1:] > 0, 1 / values[:, 1:], 0.0)
@@ -70,57 +67,45 @@ class SkiLines:
 
     def equations(self, state: Floats) -> Equations:
         """Distances of the measured points from the projected line, reduced to mean and turn for each image."""
-        n, m = self.seen.shape
-        v, covariance = np.zeros((n, m, 2)), np.zeros((n, m, 2, 2))
-        by_object, by_calibration = np.zeros((n, m, 2, 4)), np.zeros((n, m, 2, self.parameters))
-        in_front = np.zeros((n, m), bool)
-        for image, camera in enumerate(self.cameras):
-            part = self._image(image, camera, state)
-            v[:, image], by_object[:, image], covariance[:, image], in_front[:, image] = part[:4]
-            by_calibration[:, image, :, camera.columns] = np.moveaxis(part[4], -1, 0)
-        return Equations(v, by_object, by_calibration, covariance, in_front)
-
-    def _image(self, image: int, camera: PlacedCamera, state: Floats) -> tuple[Floats, Floats, Floats, Flags, Floats]:
-        """Equations of one image: v, by_object, covariance, in_front, by_calibration."""
-        xy, weight = self.xy[:, image], self.weight[:, image]
-        n, k, _ = xy.shape
-        origin, direction = state[:, None, :3] + self.shift[:, image, None], state[:, None, 3:]
-        there = _nearest_on_line(origin, direction, camera.position, self.ray[:, image])
-        parts = camera.linearised(there.reshape(-1, 3), xy.reshape(-1, 2))
-        v, by_point, by_camera = (part.reshape(n, k, *part.shape[1:]) for part in parts)
-        tangent = _unit(np.einsum("nkab,nb->nka", by_point, state[:, 3:]))
+        n, m, k, _ = self.xy.shape
+        cameras, own = stacked(tuple(self.cameras), self.parameters)
+        origin, direction = state[:, None, None, :3] + self.shift[:, :, None], state[:, None, None, 3:]
+        there = _nearest_on_line(origin, direction, cameras.position[:, None], self.ray)
+        parts = cameras.in_turn(n, k).equations(there.reshape(-1, 3), self.xy.reshape(-1, 2))
+        v, by_point, by_own, before = (part.reshape(n, m, k, *part.shape[1:]) for part in parts)
+        tangent = _unit((by_point @ state[:, None, None, 3:, None])[..., 0])
         normal = np.stack((-tangent[..., 1], tangent[..., 0]), axis=-1)
-        across = np.einsum("nka,nkab->nkb", normal, by_point)
+        across = (normal[..., None, :] @ by_point)[..., 0, :]
         one, other = across_axes(state[:, 3:])
         lever = ((there - origin) * direction).sum(axis=-1)
-        on_one, on_other = np.einsum("nkb,nb->nk", across, one), np.einsum("nkb,nb->nk", across, other)
+        on_one, on_other = (across * one[:, None, None]).sum(axis=-1), (across * other[:, None, None]).sum(axis=-1)
         design = np.stack((on_one, on_other, lever * on_one, lever * on_other), axis=-1)
-        gain, own = self._reduction(image, tangent)
-        return (
-            np.einsum("nrk,nk->nr", gain, (normal * v).sum(axis=-1)),
+        gain, covariance = self._reduction(tangent)
+        return Equations(
+            (gain @ (normal * v).sum(axis=-1)[..., None])[..., 0],
             gain @ design,
-            own,
-            np.asarray((camera.in_front(there) | (weight == 0)).all(axis=1)),
-            gain @ np.einsum("nka,nkaq->nkq", normal, by_camera),
+            gain @ (normal[..., None, :] @ by_own)[..., 0, :] @ own,
+            covariance,
+            np.asarray((before | (self.weight == 0)).all(axis=2)),
         )
 
-    def _reduction(self, image: int, tangent: Floats) -> tuple[Floats, Floats]:
-        """From distances across the line to their weighted mean and turn: gains (n, 2, k), and covariance (n, 2, 2).
+    def _reduction(self, tangent: Floats) -> tuple[Floats, Floats]:
+        """From distances across the line to their weighted mean and turn: gains (n, m, 2, k), covariance (n, m, 2, 2).
 
         The turn is given as the distance that it makes at the points' root mean square distance from their centre.
         """
-        xy, weight = self.xy[:, image], self.weight[:, image]
-        total = weight.sum(axis=1, keepdims=True)
+        xy, weight = self.xy, self.weight
+        total = weight.sum(axis=2, keepdims=True)
         total = np.where(total > 0, total, 1.0)
-        centre = (weight[..., None] * xy).sum(axis=1, keepdims=True) / total[..., None]
-        axis = _unit((weight[..., None] * tangent).sum(axis=1, keepdims=True))
+        centre = (weight[..., None] * xy).sum(axis=2, keepdims=True) / total[..., None]
+        axis = _unit((weight[..., None] * tangent).sum(axis=2, keepdims=True))
         along = ((xy - centre) * axis).sum(axis=-1)
-        along = along / np.sqrt((weight * along**2).sum(axis=1, keepdims=True) / total)
-        gain = np.stack((weight / total, weight * along / total), axis=1)
-        own = np.zeros((len(xy), 2, 2))
-        own[:, 0, 0] = 1 / total[:, 0] + self.common[:, image] ** 2
-        own[:, 1, 1] = 1 / total[:, 0]
-        return gain, own
+        along = along / np.sqrt((weight * along**2).sum(axis=2, keepdims=True) / total)
+        gain = np.stack((weight / total, weight * along / total), axis=2)
+        covariance = np.zeros((*total.shape[:2], 2, 2))
+        covariance[..., 0, 0] = 1 / total[..., 0] + self.common**2
+        covariance[..., 1, 1] = 1 / total[..., 0]
+        return gain, covariance
 
     def moved(self, state: Floats, step: Floats) -> Floats:
         """Lines (n, 6) changed by steps (n, 4) of their local parameters."""
@@ -189,7 +174,8 @@ def skis_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Fl
         xy[i, j, :points], weight[i, j, :points], common[i, j] = ski.xy, ski.sigma**-2.0, ski.common
         xy[i, j, points:] = ski.xy[0]  # with weight 0, but where rays and lines meet
         by_hand[i, j] = ski.source is Source.BY_HAND
-    ray = np.stack([rays(camera, xy[:, j]) for j, camera in enumerate(cameras)], axis=1)
+    arrays, _ = stacked(cameras, len(system.covariance))
+    ray = arrays.in_turn(n, k).rays(xy.reshape(-1, 2)).reshape(n, m, k, 3)
     return SkiLines(
         cameras,
         len(system.covariance),

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.special import chdtri
 
 from analysis.motion.adjustment.blocks import Normals, Solution, solve
-from analysis.motion.model.camera_arrays import CameraArrays
 from analysis.motion.model.channels import CHANNELS, MotionFrame
 from analysis.motion.model.equations import Equations, linearised
 from analysis.motion.model.observations import Observations
 from analysis.motion.model.prior import STATE, Prior, transitions
+from analysis.scene.camera_arrays import CameraArrays
 from rig.arrays import Flags, Floats
 
 _RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance

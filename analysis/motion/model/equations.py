@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from analysis.measurements.model import POINTS
-from analysis.motion.model.camera_arrays import CameraArrays
 from analysis.motion.model.channels import CHANNELS, VECTORS, MotionFrame
 from analysis.motion.model.observations import GROUPS, Observations
+from analysis.scene.camera_arrays import CameraArrays
 from rig.arrays import Floats, Integers
 
 _POINTS = len(POINTS)

@@ -21,7 +21,7 @@ from analysis.measurements.model import (
     SkiMeasurement,
     Source,
 )
-from analysis.motion.model.camera_arrays import CameraArrays
+from analysis.scene.camera_arrays import CameraArrays
 from rig.arrays import Flags, Floats
 from rig.clocks import NS_PER_S
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements
 from analysis.motion.adjustment.bundle import root_of
-from analysis.motion.model.camera_arrays import CameraArrays, own_root
 from analysis.motion.model.channels import CHANNELS, VECTORS, MotionFrame
 from analysis.motion.model.equations import linearised
 from analysis.motion.model.observations import GROUPS, observations
@@ -14,6 +13,7 @@ from analysis.motion.model.prior import STATE
 from analysis.motion.quantities import smoothed_states
 from analysis.motion.start_values import start_values
 from analysis.result.model import QUANTITIES, SmoothedState
+from analysis.scene.camera_arrays import CameraArrays, own_root
 from analysis.scene.camera_system import CameraSystem
 from photogrammetry.geometry.camera_model import Distortion
 from rig.arrays import Floats

@@ -1,15 +1,17 @@
-"""The cameras of a motion as arrays, so that the images of all of them are computed at once.
+"""Cameras as arrays, so that the images of all of them are computed at once.
 
-A jump has few measurements in each image, and each call on arrays costs the same however small they are; so one call
-for all cameras, not one for each, decides how fast a motion is computed.
+A pulse or jump has few measurements in each image, and each call on arrays costs the same however small they are; so
+one call for all cameras, not one for each, decides how fast points, skis and motions are computed.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
-from analysis.scene.camera_system import CameraSystem
+from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.camera_model import (
     INTERIOR,
     Lens,
@@ -22,11 +24,13 @@ from photogrammetry.geometry.camera_model import (
     undistort,
 )
 from photogrammetry.geometry.rotation import rotation_from_vector
-from rig.arrays import Floats, Integers
+from rig.arrays import Flags, Floats, Integers
 
 _MIRROR = np.array([1.0, -1.0])  # pixel frame to metric frame
 _POSE = 6
 _OWN = _POSE + len(INTERIOR)
+#: So many groups of cameras are kept as arrays: those of the logs that are measured by hand.
+_KEPT: Final = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +54,11 @@ class CameraArrays:
     @classmethod
     def of(cls, system: CameraSystem, names: Sequence[str]) -> "CameraArrays":
         """Some cameras of a system, in its order; names that it does not have are left out."""
-        placed = [system[name] for name in system.names if name in names]
+        return cls.placed([system[name] for name in system.names if name in names])
+
+    @classmethod
+    def placed(cls, placed: Sequence[PlacedCamera]) -> "CameraArrays":
+        """Cameras in this order."""
         lenses = [camera.camera.lens() for camera in placed]
         return cls(
             tuple(camera.name for camera in placed),
@@ -78,6 +86,16 @@ class CameraArrays:
         lens = Lens(self.lens.interior[numbers], self.lens.balance[numbers], self.lens.measured[numbers])
         return CameraArrays((), lens, self.position[numbers], self.rotation[numbers], self.centre[numbers])
 
+    def in_turn(self, times: int, each: int = 1) -> "CameraArrays":
+        """The camera of each observation: so many times all cameras in turn, each with so many observations."""
+        return self.each(np.tile(np.repeat(np.arange(len(self.position)), each), times))
+
+    def rays(self, xy: Floats) -> Floats:
+        """Unit vectors (m, 3) in the object system from the cameras to what appears at xy (m, 2), px."""
+        towards = np.concatenate((self.reduced(xy), -self.lens.interior[:, :1]), axis=1)
+        unit = towards / np.linalg.norm(towards, axis=1, keepdims=True)
+        return np.asarray((self.rotation @ unit[..., None])[..., 0])
+
     def reduced(self, xy: Floats) -> Floats:
         """Image coordinates (m, 2) without distortion and principal point, metric frame, from px (m, 2)."""
         return np.asarray(undistort(self.lens, self._metric(xy)), float)
@@ -87,6 +105,11 @@ class CameraArrays:
         return np.asarray(distort(self.lens, reduced) * _MIRROR + self.centre, float)
 
     def linearised(self, xyz: Floats, xy: Floats) -> tuple[Floats, Floats, Floats]:
+        """As `equations`, with NaN for v where a point is not before the camera."""
+        v, by_point, by_own, before = self.equations(xyz, xy)
+        return np.where(before[:, None], v, np.nan), by_point, by_own
+
+    def equations(self, xyz: Floats, xy: Floats) -> tuple[Floats, Floats, Floats, Flags]:
         """Residuals of image points and their derivatives, px, pixel frame.
 
         Args:
@@ -94,16 +117,15 @@ class CameraArrays:
             xy: (m, 2) measured image points.
 
         Returns:
-            v: (m, 2) computed - observed, NaN where a point is not before the camera; derivatives by the object point
-            (m, 2, 3), and by the camera's parameters (m, 2, 16) in the order of `own_root`.
+            v: (m, 2) computed - observed; derivatives by the object point (m, 2, 3), and by the camera's parameters
+            (m, 2, 16) in the order of `own_root`; whether the points are before the camera (m,).
         """
         with np.errstate(all="ignore"):
             equations = linearise(self.lens, self.rotation, self.position, xyz, self._metric(xy))
-        before = camera_coordinates(self.rotation, self.position, xyz)[:, 2:] < 0
+        before = camera_coordinates(self.rotation, self.position, xyz)[:, 2] < 0
         by_own = np.concatenate((equations.by_pose, equations.by_interior), axis=-1)
         mirror = _MIRROR[:, None]
-        v = np.where(before, equations.v * _MIRROR, np.nan)
-        return v, equations.by_point * mirror, by_own * mirror
+        return equations.v * _MIRROR, equations.by_point * mirror, by_own * mirror, np.asarray(before)
 
     def line(self, start: Floats, direction: Floats, xy: Floats) -> "CameraLine":
         """Straight lines in space as the cameras see them.
@@ -157,14 +179,23 @@ class CameraLine:
         return np.asarray(v), np.asarray(tangent + np.where(self.lens.measured[:, None], 0.0, bent))
 
 
+@lru_cache(_KEPT)
+def stacked(cameras: tuple[PlacedCamera, ...], parameters: int) -> tuple[CameraArrays, Floats]:
+    """Cameras as arrays, and which of so many uncertain parameters p are pose and interior of each: (m, 16, p)."""
+    return CameraArrays.placed(cameras), _own(cameras, np.eye(parameters))
+
+
 def own_root(system: CameraSystem, names: Sequence[str], root: Floats) -> Floats:
     """(m, 16, r): the rows of a root (p, r) of the covariance that belong to pose and interior of each camera.
 
     Rows of parameters that are certain are zero.
     """
-    out = np.zeros((len(names), _OWN, root.shape[1]))
-    for i, name in enumerate(names):
-        placed = system[name]
+    return _own([system[name] for name in names], root)
+
+
+def _own(cameras: Sequence[PlacedCamera], root: Floats) -> Floats:
+    out = np.zeros((len(cameras), _OWN, root.shape[1]))
+    for i, placed in enumerate(cameras):
         uncertain = np.concatenate((np.arange(_POSE), _POSE + placed.interior))
         out[i, uncertain] = root[placed.columns]
     return out

@@ -139,6 +139,7 @@ export const words = {
   "digitize.result_failed": "It could not be computed:",
   "digitize.compute": "Compute",
   "digitize.compute_cancel": "Cancel",
+  "digitize.curves_title": "Curves",
   "digitize.curves_follow": "New curves follow …",
   "digitize.curve": "{name}: click goes to the pulse",
   "digitize.files": "Files and operators",

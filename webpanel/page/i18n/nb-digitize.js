@@ -139,6 +139,7 @@ export const words = {
   "digitize.result_failed": "Det kunne ikke regnes ut:",
   "digitize.compute": "Regn ut",
   "digitize.compute_cancel": "Avbryt",
+  "digitize.curves_title": "Kurver",
   "digitize.curves_follow": "Nye kurver kommer …",
   "digitize.curve": "{name}: et klikk går til pulsen",
   "digitize.files": "Filer og operatører",

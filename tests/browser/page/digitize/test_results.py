@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from tests.analysis.simulated import SIZE, training
 from tests.browser.conftest import Open
-from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, enter, screen
+from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, canvas_of, enter, screen
 from tests.support.waiting import wait_until
 
 CAMERAS = ("K1", "K2", "K3")
@@ -66,9 +66,11 @@ def test_curves_follow_while_one_measures_and_a_click_on_one_goes_to_its_pulse(d
             for thing in ("P1", "P2", "P3", "P4"):
                 _mark(desk, camera, thing, desk.true(camera, thing, pulse), pulse)
     page = enter(open_page, desk, width=1500, height=1000)
+    picture = canvas_of(page, "K1")
     curve, curves = page.locator('#curves [data-of="height"]'), page.locator("#curves")
     expect(curve).to_be_visible(timeout=100_000)  # nobody asked to compute
     expect(page.locator("#result-state")).to_have_text("Nothing is computed yet.")
+    assert canvas_of(page, "K1") == picture, "curves that come move no picture"
     before = curve.locator(".line").get_attribute("d") or ""
     assert before.count("L") == 8, "nine pulses"
     plot = curve.locator(".plot")
@@ -92,6 +94,12 @@ def test_curves_follow_while_one_measures_and_a_click_on_one_goes_to_its_pulse(d
         expect(page.locator("#pulse-number")).to_have_text(str(pulse))
     page.keyboard.press("ArrowLeft")
     expect(page.locator("#pulse-number")).to_have_text("13")
+    box = plot.bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] < 1000, "they are on the screen with the pictures"
+    page.locator("#following > summary").click()
+    page.reload()
+    expect(page.locator("#following")).not_to_have_attribute("open", "")
 
 
 @pytest.mark.long

@@ -15,6 +15,7 @@ import { say, t } from "../../i18n/i18n.js";
 import { $, make, setText } from "../../shared/dom.js";
 import { number } from "../../shared/format.js";
 import { attempt } from "../../shared/snacks.js";
+import { load, save } from "../../shared/store.js";
 import { select } from "../marking/marking.js";
 import { getCurves } from "../session/server.js";
 import { state, watch } from "../session/state.js";
@@ -26,6 +27,9 @@ const [WIDTH, HEIGHT] = [1000, 100];
 /** @type {Record<string, string>} */
 const SIGNS = { alpha: "α, °", beta: "β, °", gamma: "γ, °", dphi: "Δφ, °", phi: "φ, °", height: "Z₀, m", speed: "v, m/s", angle_of_attack: "∠v, °" };
 
+/** Beside lists, where a low screen needs its height for the pictures: there they are shown when they are asked for. */
+const LOW = "(min-width: 1200px) and (max-height: 819px)";
+
 /** By quantity. @type {Map<string, Drawing>} */
 const drawings = new Map();
 /** @type {import("../types.js").HandCurves|null} */
@@ -35,7 +39,10 @@ let asked = "";
 let underWay = false;
 
 export function startCurves() {
-  $("result").addEventListener("toggle", follow);
+  const card = $("following");
+  card.open = load("digitize.curves", !matchMedia(LOW).matches);
+  card.querySelector("summary").addEventListener("click", () => save("digitize.curves", !card.open));
+  card.addEventListener("toggle", follow);
   document.addEventListener("visibilitychange", follow);
   watch(() => {
     follow();
@@ -50,7 +57,7 @@ function wanted() {
 
 /** Ask for the curves of the newest marks, until they are there. */
 function follow() {
-  if (!underWay && asked !== wanted() && state.session && $("result").open && !document.hidden) void ask();
+  if (!underWay && asked !== wanted() && state.session && $("following").open && !document.hidden) void ask();
 }
 
 async function ask() {

@@ -120,6 +120,14 @@ def utc_fields() -> dict[str, str]:
         return {"utc": "unknown", "utc_why": error.strerror or str(error)}
 
 
+def is_synchronized() -> bool:
+    """Whether some program keeps the clock right; where the kernel does not tell, nobody knows of one."""
+    try:
+        return utc_state().synchronized
+    except OSError:  # a container or a unit may forbid to ask
+        return False
+
+
 def utc_state() -> UtcState:
     """Ask the kernel.
 

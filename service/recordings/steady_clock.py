@@ -5,19 +5,12 @@ from collections.abc import Callable
 from typing import Final
 
 from rig.clocks import NS_PER_S, UtcAnchor
-from rig.host.utc_clock import SetClock, utc_state
+from rig.host.utc_clock import SetClock, is_synchronized
 
 #: Programs that keep a clock right move it by less than 5 ms between two looks (500 ppm, adjtimex(2)); a step is more.
 _STEP_NS: Final = NS_PER_S
 #: For so long after a step, and after the service has begun to look, nothing is old.
 QUIET_S: Final = 3600.0
-
-
-def _synchronized() -> bool:
-    try:
-        return utc_state().synchronized
-    except OSError:  # a sandbox that does not let us ask
-        return False
 
 
 class SteadyClock:
@@ -33,7 +26,7 @@ class SteadyClock:
         self,
         utc_s: Callable[[], float] = time.time,
         running_s: Callable[[], float] = lambda: time.clock_gettime(time.CLOCK_BOOTTIME),
-        synchronized: Callable[[], bool] = _synchronized,
+        synchronized: Callable[[], bool] = is_synchronized,
     ) -> None:
         self._running_s, self._synchronized = running_s, synchronized
         self._set = SetClock(lambda: UtcAnchor(round((utc_s() - running_s()) * NS_PER_S)), _STEP_NS)

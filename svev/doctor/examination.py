@@ -62,9 +62,16 @@ def probes(rig: RigSettings, directory: Path, interrupted: bool | None = None) -
         Probe("trigger line", Topic.CAMERAS, lambda: gpio.look_at_gpio(rig)),
         Probe("light barrier", Topic.CAMERAS, lambda: gpio.look_at_barrier(rig, interrupted)),
         Probe("discovery", Topic.CAMERAS, lambda: gige.look_for_cameras(rig), limit_s=10.0),
-        Probe("clock", Topic.TIME, machine.look_at_clock),
+        Probe("clock", Topic.TIME, lambda: machine.look_at_clock(_dated_files(rig, directory))),
         Probe("processor", Topic.PROCESSOR, machine.look_at_processor),
     ]
+
+
+def _dated_files(rig: RigSettings, directory: Path) -> list[Path]:
+    """Files that were written before now, by which the clock is judged."""
+    analysis = rig.analysis
+    named = (rig.calibration, rig.plan, *(() if analysis is None else (analysis.survey, analysis.calibration)))
+    return [*directory.glob("*.mcap"), *(file for file in named if file is not None)]
 
 
 def firewire_probes(rig: RigSettings) -> list[Probe]:

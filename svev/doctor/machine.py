@@ -8,41 +8,29 @@ import re
 import shutil
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
-from datetime import datetime, timedelta
+from collections.abc import Callable, Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
 
+from rig.host.clock_doubt import SET_THE_CLOCK, clock_doubt
 from rig.host.utc_clock import utc_state
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 from service.processes.memory import available_bytes, memory_needed
 from svev.doctor.finding import Finding, Level, Topic, failure, judged, passed, warning
 
-#: A clock that is earlier than this file is wrong; so is one that stands still without power.
-_INSTALLED = Path(__file__)
-#: Computers that keep local time may write files with a time that is off by this.
-_ZONES = timedelta(days=1)
 _FAST = {"performance", "schedutil", "ondemand"}
 
 
-def look_at_clock() -> Iterator[Finding]:
-    """Is the clock synchronized? It only dates recordings; pulses are paired by a clock that never jumps."""
-    clock = utc_state()
-    now, installed = (datetime.fromtimestamp(at).astimezone() for at in (time.time(), _INSTALLED.stat().st_mtime))
-    if now < installed - _ZONES:
-        yield warning(
-            Topic.TIME,
-            "check_clock_wrong",
-            "the clock says {now}, which is before this program was installed ({installed}): recordings get that date, "
-            "and are put in order by it",
-            'set it: sudo date -s "YYYY-MM-DD hh:mm", or connect a network; if it is wrong whenever the power was off, '
-            "the battery on the mainboard is empty",
-            now=f"{now:%Y-%m-%d %H:%M}",
-            installed=f"{installed:%Y-%m-%d}",
-        )
-    elif not clock.synchronized:
+def look_at_clock(files: Iterable[Path] = ()) -> Iterator[Finding]:
+    """Does the clock tell the right date? It only dates recordings; pulses are paired by a clock that never jumps.
+
+    Args:
+        files: that were written before now.
+    """
+    if (doubt := clock_doubt(files)) is not None:
+        yield judged(Level.WARN, Topic.TIME, doubt, SET_THE_CLOCK)
+    elif not (clock := utc_state()).synchronized:
         yield warning(
             Topic.TIME,
             "check_clock_free",

@@ -22,6 +22,7 @@ from rig.api.jump import LastJump
 from rig.api.status import ArmOrder
 from rig.errors import ProcessDiedError, StateForbidsError
 from rig.events import Event, Level
+from rig.host.clock_doubt import clock_doubt
 from rig.host.disk import free_bytes
 from rig.host.endings import ENDINGS
 from rig.phrase import Phrase, phrase, plain
@@ -255,7 +256,9 @@ def _telling(
 
 
 def _tell_of_folders(settings: ServiceSettings, rig: RigSettings, data: Path, hub: EventHub, exports: Exports) -> None:
-    """Say if exports have no folder, logs cannot be listed, or the command line overrides the rig file's folder."""
+    """Say if exports have no folder, logs cannot be listed, the date is doubtful, or --data overrides the rig file."""
+    if (doubt := clock_doubt((settings.rig, *data.glob("*.mcap")))) is not None:
+        hub.tell(Event.now(Level.WARNING, "clock", doubt))
     if exports.refused is not None:
         hub.tell(Event.now(Level.ERROR, "exports", exports.refused))
     if hidden := unlisted_logs(data):

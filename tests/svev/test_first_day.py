@@ -1,6 +1,8 @@
 """Likely mistakes of a first day: each is one line that says what to do."""
 
 import json
+import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ from analysis.scene.survey import read_survey
 from photogrammetry.network.calibration_file import read_calibration
 from photogrammetry.network.file import read_network
 from rig.errors import BadInputError
+from rig.settings.file import CONFIG
 from svev.cli import main
 from tests.analysis.scene.hill import survey_json, training, training_images
 from tests.support.loopback import Loopback
@@ -128,3 +131,28 @@ def test_an_exposure_longer_than_the_period(
     said = capsys.readouterr().err
     assert "warning: K1: it exposes for 40.0 ms, pulses come every 33.3 ms, so it misses pulses" in said
     assert "shorten exposure_us, or lower trigger.rate_hz" in said
+
+
+def test_a_clock_in_the_future_or_a_file_from_there(
+    tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Somebody has typed a wrong year: it is said before the date is written, and stands in the record."""
+    next_year = time.time() + 366 * 86_400
+    network = tmp_path / "network.json"
+    network.write_bytes((CONFIG / "networks" / "hill.json").read_bytes())
+    (tmp_path / "out").mkdir()
+    (log := tmp_path / "out" / "2036-01-01T00-00-00Z.mcap").write_bytes(b"")
+    for file in (network, log):
+        os.utime(file, (next_year, next_year))
+    rig = write_rig(tmp_path, loopback, backend="sim")
+    assert main(["record", "--rig", str(rig), "--seconds", "0.2", "--out", str(tmp_path / "out")]) == 0
+    doubt = (
+        f"{time.gmtime(next_year).tm_year}-{time.strftime('%m-%d', time.localtime(next_year))}: one of the two dates"
+    )
+    said = capsys.readouterr().err
+    assert f"{log} was written on {doubt}" in said
+    assert "if today is another day, set it: sudo date -s" in said
+    report = tmp_path / "report"
+    assert main(["orient", str(network), "-o", str(tmp_path / "poses.json"), "--report", str(report)]) == 0
+    assert f"{network} was written on {doubt}" in capsys.readouterr().err
+    assert f"the date may be wrong: the clock says {time.gmtime().tm_year}" in (report / "protocol.txt").read_text()

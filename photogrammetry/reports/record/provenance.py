@@ -22,12 +22,14 @@ class Provenance:
         program: with its version.
         command: what was called, with the options that change the result.
         files: role, name and SHA-256 of each file.
+        doubt: what speaks against the date; empty: nothing does.
     """
 
     made: datetime
     program: str
     command: str
     files: tuple[tuple[str, str, str], ...]
+    doubt: str = ""
 
     def with_result(self, result: Mapping[str, Any], path: Path) -> "Provenance":
         """With the result file too, which has this text once it is written."""
@@ -38,7 +40,8 @@ class Provenance:
         """The first section of the report."""
         made = self.made.isoformat(sep=" ", timespec="seconds")
         files = Table(("file", "name", "SHA-256"), self.files)
-        return Section("Origin", (f"made {made}, {self.program}", self.command, files))
+        doubt = (f"the date may be wrong: {self.doubt}",) if self.doubt else ()
+        return Section("Origin", (f"made {made}, {self.program}", *doubt, self.command, files))
 
 
 def provenance(command: str, files: Mapping[str, Path | None]) -> Provenance:

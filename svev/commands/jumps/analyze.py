@@ -15,6 +15,7 @@ from analysis.report.kinogram.earlier import read_earlier
 from analysis.result import file as result_file
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from svev import console
+from svev.clock_warning import warn_of_clock
 from svev.commands.logs.contents import AlsoJson, LogPath
 from svev.commands.networks.delivery import (
     NOT_CONVERGED,
@@ -58,6 +59,7 @@ def analyze_command(
     Example: svev analyze recordings/jump.mcap --survey survey.json --out results/jump
     """
     refuse_existing(out / result_file.NAME, force=force)
+    warn_of_clock(file for file in (log, survey, calibration) if file is not None)
     source = read_source(survey, calibration)
     by_hand_only = None if measurements is None else read_measurements(measurements)
     more = None if by_hand is None else read_measurements(by_hand)

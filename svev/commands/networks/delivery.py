@@ -17,6 +17,7 @@ from photogrammetry.reports.result_extras import joint_covariance, with_detectab
 from photogrammetry.reports.result_file import failure_to_json, write_result
 from rig.errors import BadInputError
 from svev import console
+from svev.clock_warning import warn_of_clock
 
 OutputOption = Annotated[
     Path, typer.Option("-o", "--out", metavar="FILE", help="result file (svev-adjustment/1) to write")
@@ -84,7 +85,8 @@ def origin(context: typer.Context, **files: Path | None) -> Provenance:
         if name not in (*files, "force") and not isinstance(value, Path) and value not in (None, False)
         for each in (value if isinstance(value, list | tuple) else (value,))
     ]
-    return provenance(" ".join(("svev", str(context.info_name), *options)), files)
+    made = provenance(" ".join(("svev", str(context.info_name), *options)), files)
+    return replace(made, doubt=warn_of_clock(path for path in files.values() if path is not None))
 
 
 def written(make: Callable[[], Report], folder: Path | None) -> list[str]:

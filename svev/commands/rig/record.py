@@ -18,6 +18,7 @@ from service.headless import record as record_with
 from service.recordings.storage import new_log_path
 from svev import console
 from svev.claims import folder_claims
+from svev.clock_warning import warn_of_clock
 from svev.doctor.cameras.exposure import exposes_on
 from svev.neighbours import naming_the_publisher
 
@@ -53,6 +54,7 @@ def record(
     for camera in settings.cameras:
         if (finding := exposes_on(camera, settings)) is not None:
             aside(f"warning: {finding.what}, so it misses pulses: {finding.remedy}")
+    warn_of_clock((rig, *out.glob("*.mcap")))
     with (
         folder_claims(out, settings.recorder.fallback_directory, "svev record", "--out"),
         naming_the_publisher(settings.network.publish),

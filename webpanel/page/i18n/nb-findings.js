@@ -161,7 +161,9 @@ export const findings = {
   check_spread: ["triggertidene innen en puls ligger {typical} us fra hverandre, høyst {largest} us", "se på triggerkabler og -innganger, og på triggerforsinkelser i kameraene"],
 
   check_clock: ["klokken er synkronisert, høyst {ms} ms feil"],
-  check_clock_wrong: ["klokken sier {now}, før dette programmet ble installert ({installed}): opptak får den datoen, og blir ordnet etter den", "still den: sudo date -s \"ÅÅÅÅ-MM-DD tt:mm\", eller koble til et nettverk; er den alltid feil etter at strømmen har vært borte, er batteriet på hovedkortet tomt"],
+  check_clock_wrong: ["klokken sier {now}, før dette programmet ble installert ({installed}): opptak får den datoen, og blir ordnet etter den", "er det en annen dag i dag, still den: sudo date -s \"ÅÅÅÅ-MM-DD tt:mm\", eller koble til et nettverk; er den alltid feil etter at strømmen har vært borte, er batteriet på hovedkortet tomt"],
+  check_clock_before: ["klokken sier {now}, og {file} ble skrevet {written}: en av de to datoene er feil", "er det en annen dag i dag, still den: sudo date -s \"ÅÅÅÅ-MM-DD tt:mm\", eller koble til et nettverk; er den alltid feil etter at strømmen har vært borte, er batteriet på hovedkortet tomt"],
+  check_clock_late: ["klokken sier {now}, år etter at dette programmet ble installert ({installed}), og ikke noe nettverk holder den riktig", "er det en annen dag i dag, still den: sudo date -s \"ÅÅÅÅ-MM-DD tt:mm\", eller koble til et nettverk; er den alltid feil etter at strømmen har vært borte, er batteriet på hovedkortet tomt"],
   check_clock_free: ["klokken er ikke synkronisert: opptak får den datoen og tiden som maskinen tror det er", "kjør: sudo apt-get install systemd-timesyncd, og vent et minutt; uten nettverk stilles den med `date`"],
   check_governor: ["{cores} kjerner, governor: {governor}"],
   check_governor_none: ["{cores} kjerner, governor: ingen (maskinen under denne bestemmer)"],

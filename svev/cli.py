@@ -14,6 +14,7 @@ import resource
 import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from io import StringIO
@@ -79,7 +80,7 @@ _USAGE_ERROR: Final[type[Exception]] = typer.BadParameter.__mro__[1]
 
 
 class _Commands(TyperGroup):
-    """All commands; help names an argument by its metavar alone, without the Python type behind it."""
+    """All commands; help names an argument by its metavar alone, without type or braces, and ranges in words."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -90,10 +91,26 @@ class _Commands(TyperGroup):
             for parameter in command.params:
                 if parameter.param_type_name == "argument":
                     parameter.display_type_rich = _no_type
+                    parameter._usage_display_name = partial(_in_usage, parameter)
+                parameter._get_number_range_help_str = partial(_range, parameter)
 
 
 def _no_type(ctx: Any) -> None:
     """The type of an argument as help shows it: not at all."""
+
+
+def _in_usage(argument: Any) -> str:
+    """An argument in the line that shows how a command is used."""
+    name = argument.metavar if argument.nargs == 1 else f"{argument.metavar.removesuffix('...')}..."
+    return name if argument.required else f"[{name}]"
+
+
+def _range(parameter: Any) -> str | None:
+    """The numbers that an option or argument allows, in words."""
+    least, most = (None if end is None else f"{end:.10g}" for end in (parameter.min, parameter.max))
+    if least is not None and most is not None:
+        return f"{least} to {most}"
+    return f"at least {least}" if least is not None else None if most is None else f"at most {most}"
 
 
 def command_line(names: Iterable[str] = _COMMANDS) -> typer.Typer:

@@ -10,7 +10,6 @@ from analysis.targets.pattern import FIRST_CIRCLES, FIRST_SINGLE, MOST_SINGLE, L
 from analysis.targets.pdf import pdf
 from analysis.targets.sheets import board_geometry, board_page, frame_geometry, target_pages
 from svev import console
-from svev.commands.networks.delivery import JsonOption
 from svev.commands.networks.layout import BoardOption, SquareOption, TargetOption, columns_and_rows
 from svev.overwriting import ForceOption, refuse_existing
 
@@ -37,7 +36,7 @@ def target(
         typer.Option("--targets", metavar="N", min=1, max=MOST_SINGLE, help="how many single targets of each kind"),
     ] = 24,
     force: ForceOption = False,
-    as_json: JsonOption = False,
+    as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Make targets to print, as PDF of exact size: a ChArUco board, and single coded targets for a frame in space.
 

@@ -3,9 +3,10 @@
 A disc's picture is an ellipse, |M (p - q)| = 1 with a symmetric M. Around it the grey values are fitted by its edge,
 blurred by a Gaussian of width s,
 
-    g(p) = b + g' (p - p0) + a erf(d(p) / (sqrt(2) s)),   d = (rho - 1) rho / |M M (p - q)|,   rho = |M (p - q)|,
+    g(p) = (1 + l (p - p0)) (b + a erf(d(p) / (sqrt(2) s))),   d = (rho - 1) rho / |M M (p - q)|,   rho = |M (p - q)|,
 
-with unknown q, M, contrast a, background b with slope g', and s; d is the distance from the ellipse to first order.
+with unknown q, M, contrast a, background b, slope of the light l, and s; d is the distance from the ellipse to first
+order.
 
 The ellipse's middle q is not the picture of the disc's centre when the disc is seen aslant: it is off by about
 c (r / Z)^2 sin(t) cos(t) for a disc of radius r at the distance Z that is turned by t. The four discs of a target give
@@ -153,9 +154,9 @@ def _linearised(unknowns: Floats, values: Floats, dx: Floats, dy: Floats, inside
     blur = np.exp(unknowns[:, 9, None])
     far = (rho - 1.0) * rho / steep / blur
     edge = erf(far / np.sqrt(2.0))
-    by_far = a * np.sqrt(2.0 / np.pi) * np.exp(-0.5 * far * far)
-    ones = np.ones_like(edge)
-    computed = a * edge + unknowns[:, 6, None] + unknowns[:, 7, None] * dx + unknowns[:, 8, None] * dy
+    light = 1.0 + unknowns[:, 7, None] * dx + unknowns[:, 8, None] * dy
+    shade = a * edge + unknowns[:, 6, None]
+    by_far = light * a * np.sqrt(2.0 / np.pi) * np.exp(-0.5 * far * far)
     by_shape = by_far / (steep * blur)
     slopes = np.stack(
         (
@@ -164,9 +165,9 @@ def _linearised(unknowns: Floats, values: Floats, dx: Floats, dy: Floats, inside
             by_shape * u * x,
             by_shape * (u * y + v * x),
             by_shape * v * y,
-            edge, ones, ones * dx, ones * dy,
+            light * edge, light, shade * dx, shade * dy,
             -by_far * far,
         ),
         axis=-1,
     )  # fmt: skip
-    return np.where(inside, computed - values, 0.0), slopes * inside[..., None]
+    return np.where(inside, light * shade - values, 0.0), slopes * inside[..., None]

@@ -2,10 +2,11 @@
 
 Around such a corner q the grey values are fitted by two straight edges, blurred by a Gaussian of width s,
 
-    g(p) = b + g' (p - p0) + a erf(n1 (p - q) / (sqrt(2) s)) erf(n2 (p - q) / (sqrt(2) s)),
+    g(p) = (1 + l (p - p0)) (b + a erf(n1 (p - q) / (sqrt(2) s)) erf(n2 (p - q) / (sqrt(2) s))),
 
-with unknown q, directions of the normals n1 and n2, contrast a, background b with slope g', and s. The pattern is
-symmetric about q, so that blur and perspective do not shift it. Least squares give q and, by the residuals, its sigma.
+with unknown q, directions of the normals n1 and n2, contrast a, background b, slope of the light l, and s. The pattern
+is symmetric about q, so that blur and perspective do not shift it. White and black are as bright as the light at their
+place, which a lens lets fall off towards the edges of a picture. Least squares give q and, by the residuals, its sigma.
 """
 
 from typing import Final
@@ -78,18 +79,18 @@ def _linearised(unknowns: Floats, values: Floats, dx: Floats, dy: Floats) -> tup
         far = (x * cos + y * sin) / blur
         parts.append((erf(far / np.sqrt(2.0)), np.sqrt(2.0 / np.pi) * np.exp(-0.5 * far * far), far, cos, sin))
     (e1, s1, f1, c1, n1), (e2, s2, f2, c2, n2) = parts
-    computed = a * e1 * e2 + unknowns[:, 5, None] + unknowns[:, 6, None] * dx + unknowns[:, 7, None] * dy
-    by_first, by_second = a * s1 * e2, a * e1 * s2
-    ones = np.ones_like(computed)
+    pattern, light = e1 * e2, 1.0 + unknowns[:, 6, None] * dx + unknowns[:, 7, None] * dy
+    shade = a * pattern + unknowns[:, 5, None]
+    by_first, by_second = light * a * s1 * e2, light * a * e1 * s2
     slopes = np.stack(
         (
             -(by_first * c1 + by_second * c2) / blur,
             -(by_first * n1 + by_second * n2) / blur,
             by_first * (-x * n1 + y * c1) / blur,
             by_second * (-x * n2 + y * c2) / blur,
-            e1 * e2, ones, ones * dx, ones * dy,
+            light * pattern, light, shade * dx, shade * dy,
             -(by_first * f1 + by_second * f2),
         ),
         axis=-1,
     )  # fmt: skip
-    return computed - values, slopes
+    return light * shade - values, slopes

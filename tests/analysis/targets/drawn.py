@@ -130,11 +130,12 @@ def looking(at: Array, away: float, *, along: float, up: float, roll: float) -> 
 
 @dataclass(frozen=True)
 class Drawing:
-    """How pictures are taken; noise in levels of eight bits, blur in px."""
+    """How pictures are taken; noise in levels of eight bits, blur in px, the light that is lost at half the width."""
 
     camera: DrawnCamera
     noise: float = 2.0
     blur: float = 0.7
+    falloff: float = 0.0
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(1))
 
     def picture(self, sheets: list[Sheet], position: Array, rotation: Array) -> NDArray[np.uint8]:
@@ -147,6 +148,8 @@ class Drawing:
         blurred = cv2.GaussianBlur(fine, (0, 0), self.blur * _FINE) if self.blur else fine
         width, height = self.camera.size
         grey = cv2.resize(blurred, (width, height), interpolation=cv2.INTER_AREA)
+        along, down = np.meshgrid(*((np.arange(n) - (n - 1) / 2) / (width / 2) for n in (width, height)))
+        grey *= (1.0 - self.falloff * (along**2 + down**2)).astype(np.float32)
         noisy = grey + self.random.normal(0.0, self.noise, grey.shape)
         return np.asarray(np.clip(np.rint(noisy), 0, 255), np.uint8)
 

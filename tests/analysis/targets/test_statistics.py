@@ -199,3 +199,24 @@ def test_corners_are_measured_to_hundredths_of_a_pixel_and_their_sigmas_say_so(k
     assert rms < 0.02
     assert np.abs(np.mean(errors, axis=0)).max() < 3.0 * rms / np.sqrt(len(errors))
     assert 0.8 < float(np.sqrt(np.mean(np.square(np.divide(errors, sigmas))))) < 1.25
+
+
+@pytest.mark.parametrize("kind", ["board", "circles"])
+def test_a_lens_that_is_darker_towards_the_edges_moves_no_corner(kind: str) -> None:
+    """The same pictures with and without: white is less bright away from the middle, and black is as dark."""
+    sheets, middle, away = _sheets(kind)
+    camera = DrawnCamera(_SIZE, 600.0)
+    inwards = []
+    for along, roll in ((0.0, 0.0), (25.0, 10.0), (-30.0, 95.0)):
+        pose = looking(middle, away * 1.25, along=along, up=5.0, roll=roll)
+        even, dark = (
+            find_targets(Drawing(camera, noise=0.3, falloff=share).picture(sheets, *pose), Layout(), "drawn").corners
+            for share in (0.0, 0.3)
+        )
+        for name in even.keys() & dark.keys():
+            place = np.array((even[name].x, even[name].y)) - (np.array(_SIZE) - 1.0) / 2.0
+            moved = (dark[name].x - even[name].x, dark[name].y - even[name].y)
+            if np.linalg.norm(place) > _SIZE[0] / 4.0:
+                inwards.append(-place @ moved / np.linalg.norm(place))
+    assert len(inwards) > 30
+    assert abs(np.mean(inwards)) < 0.001, np.mean(inwards)

@@ -16,7 +16,6 @@ from photogrammetry.network.diagnosis import NotConvergedError
 from photogrammetry.network.model import Network
 from photogrammetry.network.selection import only_points
 from photogrammetry.procedures.calibration import Calibration, calibrate
-from photogrammetry.procedures.lens_parameters import with_significant
 
 #: A target moved if its residuals are so many times the others', and others of its network shrink without it.
 _TIMES: Final = 4.0
@@ -64,15 +63,14 @@ def calibrate_pictures(
     network, contradicting = of_one_lens(network)
     pictures = _used(pictures, network)
     network, moved = _without_moved(network)
-    chosen, left_out = with_significant(network)
-    calibration = calibrate(chosen)
+    calibration = calibrate(network)
     a = calibration.outcome.adjustment
     return PictureCalibration(
-        chosen,
+        network,
         calibration,
         pictures,
         tuple(verdicts(a, pictures)),
-        (*notes, *odd, *contradicting, *moved, *left_out, *print_notes(a, layout, scaled=bool(distances))),
+        (*notes, *odd, *contradicting, *moved, *print_notes(a, layout, scaled=bool(distances))),
     )
 
 

@@ -28,7 +28,7 @@ from photogrammetry.network.selection import RAYS
 from rig.arrays import Floats
 from rig.errors import BadInputError
 
-#: Unknowns of each camera at first; `with_significant` takes out `a2` where the pictures do not ask for it.
+#: Unknowns of each camera. None is left out for being insignificant: the others would make up for it.
 ESTIMATE = ("c", "x0", "y0", "a1", "a2", "b1", "b2")
 #: What is known of any lens beforehand: sigmas of weighted observations, in terms of the picture's width w. They
 #: keep pictures that say too little solvable, so that the verdict can tell what is missing; others they do not touch.

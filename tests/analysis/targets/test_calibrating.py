@@ -72,13 +72,13 @@ def test_a_frame_of_unknown_targets_gives_the_lens() -> None:
     for name in ("c", "x0", "y0", "a1"):
         assert abs(found[name].value - getattr(_CAMERA, name)) < 3.0 * found[name].sigma
     assert 0.9 < a.ratio < 1.1
-    assert "a2" not in found  # there is no such distortion, and it is not estimated
-    assert abs(found["b1"].value) < 3.0 * found["b1"].sigma  # nor decentring, which is, since any lens may have some
+    for name in ("a2", "b1", "b2"):  # there is none, and it is estimated all the same, since any lens may have some
+        assert abs(found[name].value) < 3.0 * found[name].sigma
     (verdict,) = made.verdicts
     assert verdict.good
     assert "good enough for 1:1000" in verdict.words
     assert verdict.advice == ()
-    assert "a2 not significant, left out" in " ".join(made.notes)
+    assert not any("left out" in note for note in made.notes)
 
 
 def test_the_board_is_not_taken_as_flat_unless_one_says_so() -> None:

@@ -77,7 +77,10 @@ def judge(
     found += [offset.said for offset in synchrony.values() if offset.said is not None]
     found += [move.said for move in moved]
     if takeoff is None:
-        text = "the take-off was not found, so times are counted from the first pulse"
+        text = (
+            "the take-off was not found, so times are counted from the first pulse: two cameras must see the edge of "
+            "the table, and him some metres before it"
+        )
         found.append(phrase("jump_no_takeoff", text))
     unexplained = [name for name in system.names if name not in synchrony or synchrony[name].said is None]
     found += _contradicting(delivered, {name: system[name] for name in unexplained}, tests)

@@ -134,6 +134,7 @@ def test_without_a_take_off_nothing_is_said_of_edge_and_flight() -> None:
     flying = _computed(lambda k, pulse: pulse if k >= 25 and k % 3 else replace(pulse, images={}))
     assert flying.takeoff is None
     assert "the take-off was not found" in flying.verdict.message
+    assert "two cameras must see the edge of the table, and him some metres before it" in flying.verdict.message
     assert "around the edge" not in flying.verdict.message
     assert "in flight" not in flying.verdict.message
 

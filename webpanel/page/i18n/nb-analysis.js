@@ -14,7 +14,7 @@ export const analysis = {
   jump_enlarged: ["standardavvikene i bildene var for små og er økt: {what}"],
   jump_enlarged_points: ["punktene {factor} ganger"],
   jump_enlarged_skis: ["skiene {factor} ganger"],
-  jump_no_takeoff: ["satsen ble ikke funnet, så tiden regnes fra den første pulsen"],
+  jump_no_takeoff: ["satsen ble ikke funnet, så tiden regnes fra den første pulsen: to kameraer må se hoppkanten, og hopperen noen meter før den"],
   jump_too_few: ["bare {count} av {pulses} pulser viser {what}{where}"],
   jump_all_points: ["alle punkter"],
   jump_both_skis: ["begge skiene"],

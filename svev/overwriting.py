@@ -20,9 +20,11 @@ def refuse_existing(*outputs: Path | None, force: bool) -> None:
         force: the person wants them replaced.
 
     Raises:
-        BadInputError: one of them exists.
+        BadInputError: one of them exists, or is a folder.
     """
     for path in outputs:
+        if path is not None and path.is_dir():
+            raise BadInputError(f"{path}: is a folder; name a file in it")
         if path is not None and path.is_file() and not force:
             raise BadInputError(f"{path}: exists already; choose another name, or replace it by --force")
 

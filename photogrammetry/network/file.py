@@ -56,8 +56,6 @@ def read_network(path: Path) -> Network:
         BadInputError: missing, unreadable, neither JSON nor TOML, or no network; one line with file, keys and remedies.
     """
     data = read_object(path)
-    if "format" not in data and ("balls" in data or "rods" in data):
-        raise BadInputError(f"{path}: is a plan; svev plan {path} --simulate NETWORK.json makes a network of it")
     require_format(data, NETWORK, path)
     return network_from_json(data, str(path))
 

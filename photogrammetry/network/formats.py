@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from rig.errors import BadInputError
+from rig.settings.file_kinds import refuse_other
 
 NETWORK: Final = "svev-network/1"
 #: Results, which `svev calibrate`, `orient` and `adjust` write.
@@ -25,7 +26,7 @@ _REMEDIES: Final = {
 
 
 def require_format(data: Mapping[str, Any], wanted: str, path: Path | str) -> None:
-    """Refuse a file that says that it is another one of ours; what it says wrongly beside that is of no interest.
+    """Refuse a file that is another one of ours; what it says wrongly beside that is of no interest.
 
     Args:
         data: content of the file.
@@ -33,8 +34,9 @@ def require_format(data: Mapping[str, Any], wanted: str, path: Path | str) -> No
         path: of the file, for messages.
 
     Raises:
-        BadInputError: it has another known format.
+        BadInputError: it has another known format, or is a file that people write.
     """
+    refuse_other(data, _KINDS[wanted], path)
     given = data.get("format")
     if isinstance(given, str) and given != wanted and given in _KINDS:
         remedy = _REMEDIES.get((given, wanted), "name another file").format(path=path)

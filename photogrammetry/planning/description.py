@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from photogrammetry.network.entries import Finite, Name, Pixels, Positive, Triple
 from photogrammetry.network.strict_text import read_object
 from rig.errors import BadInputError
+from rig.settings.file_kinds import FileKind, refuse_other
 from rig.settings.strict_toml import StrictModel, validate
 
 Parameter = Literal["c", "x0", "y0", "a1", "a2", "a3", "b1", "b2", "c1", "c2"]
@@ -180,6 +181,7 @@ def read_description(path: Path) -> Description:
         BadInputError: one line with file, key and remedy.
     """
     data = read_object(path, "plan")
+    refuse_other(data, FileKind.PLAN, path)
     if "format" in data:
         raise BadInputError(f'{path}: has a "format", so it is no plan; svev adjust takes networks')
     return validate(Description, data, path)

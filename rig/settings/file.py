@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from rig.settings.file_kinds import FileKind, refuse_other
 from rig.settings.model import RigSettings
 from rig.settings.strict_toml import read_toml, validate
 
@@ -17,7 +18,9 @@ def load_rig(path: Path) -> RigSettings:
     Raises:
         BadInputError: the file is missing, is not TOML, or does not describe a rig.
     """
-    rig = validate(RigSettings, read_toml(path), path)
+    content = read_toml(path)
+    refuse_other(content, FileKind.RIG, path)
+    rig = validate(RigSettings, content, path)
     absolute: dict[str, Any] = {}
     if rig.simulation is not None:
         scenario = (path.parent / rig.simulation.scenario).resolve()

@@ -98,8 +98,11 @@ def read_toml(path: Path, *, kind: str = _RIG_FILE, most_bytes: int = _MOST_BYTE
             line and column; or a text in it is too long or holds a character that cannot be seen.
     """
     existing = "an existing one, e.g. config/rigs/sim.toml" if kind == _RIG_FILE else f"an existing {kind}"
+    text = read_text(path, "TOML", existing, most_bytes)
+    if text.lstrip().startswith("{"):
+        raise BadInputError(f"{path}: is JSON, and a {kind} is TOML; name another file")
     try:
-        data = tomllib.loads(read_text(path, "TOML", existing, most_bytes))
+        data = tomllib.loads(text)
     except RecursionError:
         raise BadInputError(f"{path}: not valid TOML: nested too deeply; correct it there") from None
     except ValueError as error:  # TOMLDecodeError, or a number with too many digits

@@ -16,6 +16,7 @@ from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.images.viewing import look_at
 from rig.pulse import HillPulse
+from rig.settings.file_kinds import FileKind, refuse_other
 from rig.settings.strict_toml import read_toml, validate
 from simrig.world.board import HeldBoard
 from simrig.world.conditions.effects import (
@@ -282,6 +283,7 @@ def load_scenario(path: Path) -> Scenario:
 def _content(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     """The keys of a scenario file and of its bases; `above` are the files that lead to it."""
     own = read_toml(path, kind="scenario")
+    refuse_other(own, FileKind.SCENARIO, path)
     board = own.get("board")
     if isinstance(board, dict) and isinstance(board.get("pattern"), str):
         board["pattern"] = str((path.parent / board["pattern"]).resolve())

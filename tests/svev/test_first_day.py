@@ -86,6 +86,53 @@ def test_another_file_of_ours(tmp_path: Path, kind: str, words: str) -> None:
             read(path)
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (
+            ["analyze", "no.mcap", "--survey", "{scenario}", "--out", "out"],
+            "is a scenario of the simulated hill, and a",
+        ),
+        (
+            ["analyze", "no.mcap", "--survey", "{rig}", "--out", "out"],
+            "is a rig file, and a network or survey is wanted",
+        ),
+        (["analyze", "no.mcap", "--survey", "{foreign}", "--out", "out"], "svev network import {foreign} balls.csv -o"),
+        (["adjust", "{scenario}", "-o", "out.json"], "is a scenario of the simulated hill, and a network or survey is"),
+        (["plan", "{scenario}"], "is a scenario of the simulated hill, and a plan is wanted; a rig file names it"),
+        (["plan", "{rig}"], "is a rig file, and a plan is wanted; name another file"),
+        (
+            ["doctor", "--rig", "{scenario}"],
+            "is a scenario of the simulated hill, and a rig file is wanted; a rig file",
+        ),
+        (
+            ["doctor", "--rig", "{plan}"],
+            "is a plan, and a rig file is wanted; svev plan {plan} --simulate NETWORK.json",
+        ),
+        (["doctor", "--rig", "{network}"], "is JSON, and a rig file is TOML; name another file"),
+        (["orient", "{network}", "-o", "{folder}"], "{folder}: is a folder; name a file in it"),
+    ],
+)
+def test_another_file_that_people_write(
+    command: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    foreign = tmp_path / "cameras.toml"
+    foreign.write_text("[K1]\nsize = [640, 480]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\ndistortions = [0, 0, 0]\n")
+    files = {
+        "scenario": CONFIG / "scenarios" / "training.toml",
+        "rig": CONFIG / "rigs" / "sim.toml",
+        "plan": CONFIG / "networks" / "hill-1.toml",
+        "network": CONFIG / "networks" / "hill.json",
+        "foreign": foreign,
+        "folder": tmp_path,
+    }
+    assert main([word.format(**files) for word in command]) == 2
+    said = capsys.readouterr().err
+    assert words.format(**files) in said
+    assert said.count("\n") == 1
+    assert len(said) < 400  # one thing is wrong: it is another file
+
+
 def test_a_survey_as_calibration(tmp_path: Path) -> None:
     path = tmp_path / "survey.json"
     path.write_text(json.dumps(survey_json(training(), seed=1)))

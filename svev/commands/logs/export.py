@@ -97,7 +97,7 @@ def export_command(
     written: list[Path] = []
     pulses = 0
     parts = _parts(log, order, out, separate=separate)
-    refuse_existing(*(file for _, file in parts), force=force)
+    refuse_existing(*(file for _, file in parts if not file.is_dir()), force=force)  # a folder is for pictures
     for part, file in parts:
         pulses = _export(log, part, file)
         written.append(file)

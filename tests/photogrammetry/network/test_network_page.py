@@ -169,6 +169,6 @@ def test_an_input_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFix
 def test_a_plan_is_no_network_and_a_network_no_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     networks = CONFIG / "networks"
     assert main(["adjust", str(networks / "rods.toml"), "--force", "-o", str(tmp_path / "result.json")]) == 2
-    assert "is a plan; svev plan" in capsys.readouterr().err
+    assert "is a plan, and a network or survey is wanted; svev plan" in capsys.readouterr().err
     assert main(["plan", str(networks / "rods.json")]) == 2
     assert "it is no plan; svev adjust takes networks" in capsys.readouterr().err

@@ -1,14 +1,18 @@
 """Reads surveys of balls as CSV, and the files of AICON and programs like it (.ior, .eor, .phc, .obc)."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from photogrammetry.exchange.part import Part, rotation_of
 from photogrammetry.exchange.table import ANGLE_UNITS, ANGLES, SIGMAS, Line, read_lines
 from photogrammetry.geometry.camera_model import INTERIOR
 from photogrammetry.network.model import ImageFrame
 from rig.errors import BadInputError
+
+#: Characters that separate cells in files of other dialects.
+_SEPARATING: Final = re.compile(r"[,;\t ]")
 
 
 def read_survey_csv(path: Path) -> Part:
@@ -67,6 +71,11 @@ def _poses(path: Path) -> Part:
     for line in lines:
         entry: dict[str, Any] = {"camera": line.labels.get("camera")}
         entry["X0"] = line.triple(("x0", "y0", "z0"))
+        if entry["X0"] is None and _SEPARATING.search(str(entry["camera"])):
+            raise BadInputError(
+                f"{line.place}: {entry['camera']!r} may be several cells; write one separator in all lines, and "
+                '"..." around names that hold it'
+            )
         for unit, factor in ANGLE_UNITS.items():
             angles = line.triple([f"{angle}_{unit}" for angle in ANGLES])
             if angles is not None and "R" in entry:

@@ -50,6 +50,8 @@ _FEWEST_NAMED: Final = 3  # columns, in a comment that is a head
 #: Blanks that may be an empty cell.
 _WIDE: Final = re.compile(r"^[ \t]|[ \t]{2}|[ \t]$")
 _WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
+#: No principal point is so far from the middle of a picture, mm.
+_FAR_MM: Final = 1.0
 #: Axes of a surveyor, by what they are: X is east, Y north, Z height, which is right-handed.
 _SURVEYORS: Final = {
     **dict.fromkeys(("e", "east", "easting"), "x"),
@@ -99,6 +101,8 @@ def read_lines(path: Path) -> tuple[list[Line], tuple[str, ...]]:
     points = with_points(words, file.separator, path)
     if file.separator == " " or (file.separator == "," and head is None):
         _check_names(file.separator, body)
+    if head is None and ending == ".ior" and file.separator == " ":
+        _check_cameras(body)
     if head is None:
         _check_unnamed(file.separator, words, path)
         if file.separator in (" ", ",") and "sx" in columns:
@@ -224,7 +228,7 @@ def _check_blanks(body: Sequence[Row], columns: Sequence[str]) -> None:
 
     Raises:
         BadInputError: a line that has not all cells has more than one blank at a place; or some cells behind the names
-            of object points are whole numbers, and other coordinates in lines of as many cells are none.
+            are whole numbers, and other numbers in lines of as many cells are none.
     """
     for row in body:
         if _WIDE.search(row.text) and len(row.cells) < len(columns):
@@ -232,10 +236,28 @@ def _check_blanks(body: Sequence[Row], columns: Sequence[str]) -> None:
                 f"{row.place}: several blanks at one place, which may be an empty cell; name the columns in the first "
                 "line, or separate the cells by semicolons"
             )
-        alike = [word for other in body if len(other.cells) == len(row.cells) for word in other.cells[1:4]]
-        decimals = columns[0] == "name" and any(is_number(word) and not _is_whole(word) for word in alike)
-        if decimals and row.cells[1:] and row.cells[1].isdecimal():
-            raise _may_be_one(row.cells[0], row.cells[1], " ", row)
+        behind = columns.index("name") + 1  # of image points the image stands before the name
+        alike = [word for other in body if len(other.cells) == len(row.cells) for word in other.cells[behind:][:3]]
+        decimals = any(is_number(word) and not _is_whole(word) for word in alike)
+        two_sigmas = columns[0] == "image" and row.cells[-1] == row.cells[-2]  # one of them would be a coordinate
+        if decimals and not two_sigmas and row.cells[behind:] and row.cells[behind].isdecimal():
+            raise _may_be_one(row.cells[behind - 1], row.cells[behind], " ", row)
+
+
+def _check_cameras(body: Sequence[Row]) -> None:
+    """Refuse cameras, separated by blanks and without named columns, whose c may be the end of the name.
+
+    Raises:
+        BadInputError: c is a whole number, and the principal point behind it is so far off that it may be c.
+    """
+    for row in body:
+        name, c, behind = (*row.cells, "", "")[:3]
+        if c.isdecimal() and is_number(behind) and abs(_number(behind)) >= _FAR_MM:
+            raise _may_be_one(name, c, " ", row)
+
+
+def _number(word: str) -> float:
+    return float(word.replace(",", "."))
 
 
 def _check_ids(cells: Sequence[Mapping[str, str]], path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from photogrammetry.exchange.columns import read_aicon
 from photogrammetry.exchange.importing import import_network
 from rig.errors import BadInputError
 
@@ -163,6 +164,8 @@ def test_object_points_whose_cells_may_be_others_are_refused(text: str, pattern:
         ("2 Ball 1 -130 98.960 0.012\n", "line 1: 'Ball 1' may be one name"),
         ("1 7  98.960 0.012\n", "line 1: several blanks at one place"),
         ("image name x y s\n2 K1 7 4.25 3.5 \n", "line 2: 'K1 7' may be one name"),
+        ("2 B1 7 4.25 3.5 0.002\n", "line 1: 'B1 7' may be one name"),
+        ("cam1 1 17 4.25 3.5 0.002\ncam1 1 18 4.5 3.5 0.002\n", "line 1: '1 17' may be one name"),
     ],
 )
 def test_image_points_whose_cells_may_be_others_are_refused(text: str, pattern: str, tmp_path: Path) -> None:
@@ -179,6 +182,12 @@ def test_image_points_whose_cells_may_be_others_are_refused(text: str, pattern: 
 )
 def test_object_points_in_wide_columns_are_read_where_none_is_empty(text: str, tmp_path: Path) -> None:
     assert _points(_file(tmp_path, text, "points.obc")) == BALLS
+
+
+@pytest.mark.parametrize("text", ["K1 7 8.5 0.01 -0.02\n", "B1 8.50 0.010 0\nK1 7 8 0 0\n"])
+def test_cameras_whose_c_may_be_of_the_name_are_refused(text: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="'K1 7' may be one name"):
+        import_network([_file(tmp_path, text, "a.ior")])
 
 
 @pytest.mark.parametrize(
@@ -199,6 +208,7 @@ def test_a_name_twice_in_a_file_is_refused(name: str, text: str, tmp_path: Path)
     ("text", "pattern"),
     [
         ("1 7 1.0 2.0\n", "line 1: has x0, y0 alone; write x0, y0, z0, or none of them"),
+        ("B1,K;1,2.5,3.5,4.5\n", "line 1: '1,2.5,3.5,4.5' may be several cells; write one separator in all lines"),
         (
             "image camera omega_deg phi_deg\n1 7 10 20\n",
             "line 2: has omega_deg, phi_deg alone; write omega_deg, phi_deg",
@@ -248,13 +258,14 @@ _MEASURED: Final = st.decimals(-200, 200, places=3).map(lambda value: f"{value:.
 _WHOLE: Final = st.integers(-200, 200).map(str)
 _VALUES: Final = st.sampled_from((*[_MEASURED] * 12, *[_WHOLE] * 3, st.just(""))).flatmap(lambda cells: cells)
 _SIGMA_CELLS: Final = st.sampled_from((*("0.005", "0.01", "0.012") * 4, "1", ""))
+_NAMES: Final = st.one_of(
+    st.sampled_from(("B1", "Ball 1", "7", "kant Ø", 'B"1', "0317", "1,5", "a;b", "North", "#1", "K1 7")),
+    st.text("aB1 ,;.Ø\"'#", min_size=1, max_size=5),
+)
 _ROWS: Final = st.integers(0, 3).flatmap(
     lambda sigmas: st.lists(
         st.tuples(
-            st.one_of(
-                st.sampled_from(("B1", "Ball 1", "7", "kant Ø", 'B"1', "0317", "1,5", "a;b", "North", "#1", "K1 7")),
-                st.text("aB1 ,;.Ø\"'#", min_size=1, max_size=5),
-            ),
+            _NAMES,
             *[_VALUES] * 3,
             *[_SIGMA_CELLS] * sigmas,
         ),
@@ -264,14 +275,17 @@ _ROWS: Final = st.integers(0, 3).flatmap(
 )
 
 
-def _written(rows: list[tuple[str, ...]], dialect: dict[str, Any]) -> bytes:
-    """The table as a program writes it with Python's csv, or plainly, without any quotes."""
+def _survey_head(rows: list[tuple[str, ...]]) -> tuple[str, ...]:
+    return ("name", "X", "Y", "Z", *{0: (), 1: ("sigma",), 2: ("sX", "sY"), 3: ("sX", "sY", "sZ")}[len(rows[0]) - 4])
+
+
+def _written(rows: list[tuple[str, ...]], columns: tuple[str, ...], names: int, dialect: dict[str, Any]) -> bytes:
+    """The table as a program writes it with Python's csv, or plainly, without any quotes; so many columns are names."""
     out = io.StringIO()
-    sigmas = {0: (), 1: ("sigma",), 2: ("sX", "sY"), 3: ("sX", "sY", "sZ")}[len(rows[0]) - 4]
     if dialect["sep"]:
         out.write(f"sep={dialect['separator']}{dialect['end']}")
-    head = [("name", "X", "Y", "Z", *sigmas)] if dialect["head"] else []
-    body = [(name, *(cell.replace(".", dialect["decimal"]) for cell in cells)) for name, *cells in rows]
+    head = [columns] if dialect["head"] else []
+    body = [(*row[:names], *(cell.replace(".", dialect["decimal"]) for cell in row[names:])) for row in rows]
     if dialect["quoting"] is None:
         out.writelines(dialect["separator"].join(row) + dialect["end"] for row in (*head, *body))
     else:
@@ -286,7 +300,9 @@ def test_a_table_in_any_dialect_is_read_right_or_refused(
 ) -> None:
     # Plainly written, a name in quotes is that without them.
     assume(dialect["quoting"] is not None or not any(name.lstrip().startswith('"') for name, *_ in rows))
-    path = _file(tmp_path_factory.getbasetemp(), _written(rows, dialect), f"any{dialect['ending']}")
+    path = _file(
+        tmp_path_factory.getbasetemp(), _written(rows, _survey_head(rows), 1, dialect), f"any{dialect['ending']}"
+    )
     try:
         imported = import_network([path])
     except BadInputError:
@@ -302,3 +318,48 @@ def test_a_table_in_any_dialect_is_read_right_or_refused(
     assert _points(path) == expected
     if any(all(row[1:]) for row in hidden):
         assert any("are comments" in note for note in imported.notes)
+
+
+_SMALL: Final = st.decimals(-1, 1, places=3).map(lambda value: f"{value:.3f}")
+_POSITIVE: Final = st.one_of(
+    st.decimals(4, 60, places=2).map(lambda value: f"{value:.2f}"), st.integers(4, 60).map(str)
+)
+#: Columns of AICON's files, how many of them are names, and their cells.
+_AICON: Final[dict[str, tuple[tuple[str, ...], int, Any]]] = {
+    ".phc": (("image", "point", "x", "y", "sx", "sy"), 2, st.tuples(_NAMES, _NAMES, _VALUES, _VALUES, _SIGMA_CELLS)),
+    ".ior": (("camera", "c", "x0", "y0"), 1, st.tuples(_NAMES, _POSITIVE, _SMALL, _SMALL)),
+    ".eor": (("image", "camera", "X0", "Y0", "Z0"), 2, st.tuples(_NAMES, _NAMES, *[_VALUES] * 3)),
+}
+
+
+@given(data=st.data(), dialect=_DIALECTS, ending=st.sampled_from(tuple(_AICON)))
+def test_files_of_aicon_in_any_dialect_are_read_right_or_refused(
+    data: st.DataObject, dialect: dict[str, Any], ending: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    columns, names, cells = _AICON[ending]
+    rows = data.draw(st.lists(cells, min_size=1, max_size=4))
+    if ending == ".phc":  # the same sigma of x and y, or that of both in one column
+        both = data.draw(st.booleans())
+        rows = [(*row, row[-1]) if both else row for row in rows]
+        columns = columns if both else (*columns[:4], "s")
+    assume(all(name.strip() for row in rows for name in row[:names]))
+    plain = dialect["quoting"] is None
+    assume(not plain or not any(name.lstrip().startswith('"') for row in rows for name in row[:names]))
+    path = _file(tmp_path_factory.getbasetemp(), _written(rows, columns, names, dialect), f"any{ending}")
+    try:
+        part = read_aicon(path, None)
+    except BadInputError:
+        return
+    lines = path.read_bytes().decode(dialect["encoding"]).splitlines()[-len(rows) :]
+    read = [row for row, line in zip(rows, lines, strict=True) if not line.lstrip().startswith(("#", "!"))]
+    named = [(*(word.strip() for word in row[:names]), *(float(word or "nan") for word in row[names:])) for row in read]
+    if ending == ".phc":
+        assert [tuple(row) for row in part.observations] == [(*row[:5], row[-1]) for row in named]
+    elif ending == ".ior":
+        assert {name: [body[key] for key in ("c", "x0", "y0")] for name, body in part.cameras.items()} == {
+            name: [abs(values[0]), *values[1:]] for name, *values in named
+        }
+    else:
+        assert {name: (body["camera"], body["X0"]) for name, body in part.images.items()} == {
+            name: (camera, None if np.isnan(values).all() else values) for name, camera, *values in named
+        }

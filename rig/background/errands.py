@@ -64,6 +64,7 @@ class Errands(Generic[State]):
         self._heard, self._done, self._failed, self._folder = heard, done, failed, folder
         self._states: dict[str, State] = {}
         self._wanted: set[str] = set()
+        self._closed = False
         self._threads: dict[str, threading.Thread] = {}
         self._lock, self._one_at_a_time = threading.RLock(), threading.Lock()
 
@@ -76,7 +77,7 @@ class Errands(Generic[State]):
         return who in self._wanted
 
     def begin(self, who: str, working: State, order: Callable[[], object]) -> State:
-        """Begin an errand; if one of the same person is under way, nothing begins.
+        """Begin an errand; if one of the same person is under way, or all is closed, nothing begins.
 
         Args:
             who: asks for it.
@@ -90,7 +91,7 @@ class Errands(Generic[State]):
         if thread is not None:
             thread.join()  # one that was cancelled ends within a moment
         with self._lock:
-            if who in self._wanted:
+            if self._closed or who in self._wanted:
                 return self.state(who)
             ordered, before = order(), self.state(who)
             self._states[who] = working
@@ -121,8 +122,9 @@ class Errands(Generic[State]):
             thread.join(timeout_s)
 
     def close(self) -> None:
-        """End what is being done."""
+        """End what is being done; nothing begins any more."""
         with self._lock:
+            self._closed = True
             self._wanted.clear()
             threads = list(self._threads.values())
         for thread in threads:

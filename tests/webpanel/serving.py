@@ -81,6 +81,7 @@ def serving(
         service.exports.close()
     assert not thread.is_alive()
     wait_until(lambda: not _workers(), "the server's worker threads have ended", 20)
+    desks.close()  # what a request that was under way has opened meanwhile
 
 
 def refused(answer: httpx.Response, status: int) -> Problem:

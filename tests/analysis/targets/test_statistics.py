@@ -138,7 +138,7 @@ def _shown(layout: Layout, sheets: Sequence[SimulatedSheet], frame: Placed, came
     [("board", "tests"), ("frame", "tests"), ("circles", "tests"), ("board", "hill"), ("frame", "hill")],
 )
 def test_errors_of_calibrations_agree_with_their_sigmas(kind: str, renderer: str, tmp_path: Path) -> None:
-    # of circles the last draw of seed 29 has c off by 4.4 sigmas, by its noise alone: the same pictures with six other
+    # of circles the last draw of seed 29 has c off by 4.0 sigmas, by its noise alone: the same pictures with six other
     # noises are off by 0.8 sigmas
     random = np.random.default_rng(301 if kind == "circles" else 29)
     layout = Layout(single_mm=_TARGET_MM)

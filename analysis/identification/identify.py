@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook
-from analysis.identification.markers.markers import BINDINGS, Markers, follow_further, follow_markers
+from analysis.identification.markers.markers import Markers, follow_further, follow_markers
 from analysis.identification.markers.refinement import only_worn, refined
 from analysis.identification.markers.synchrony import lateness
 from analysis.identification.over_time.flights import Flight, find_flights, find_tracks
 from analysis.identification.over_time.window import Window
 from analysis.identification.ski_bars import MeasuredSkis, measure_skis
+from analysis.identification.space.body import BINDINGS
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
 from analysis.measurements.model import (

@@ -16,9 +16,9 @@ from analysis.candidates.model import SecondLook
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Part, predict
 from analysis.identification.over_time.window import Window
-from analysis.identification.space.body import usual_difference
+from analysis.identification.space.body import BINDINGS, usual_difference
 from analysis.identification.space.views import Views, gate
-from analysis.measurements.model import POINTS, SIDES, SkiMeasurement
+from analysis.measurements.model import SIDES, SkiMeasurement
 from analysis.ski_bars.bars import OF_POSE, SKIS, USUAL_SHAPE, USUAL_SHAPE_SIGMA, ExpectedBars, Poses
 from analysis.ski_bars.directions import OPENING, SHARP_M, is_sharp, seek_directions
 from analysis.ski_bars.fitting import FittedBars, fit_bars
@@ -30,7 +30,6 @@ from rig.arrays import Flags, Floats
 MeasuredSkis = Mapping[str, Mapping[str, SkiMeasurement]]
 
 _VAGUE_M: Final = 0.2  #: standard deviation of the place of a binding from which its ski is sought through all pulses
-BINDINGS: Final = ("P3", "P4")
 _FEWEST: Final = 2  #: images that show a binding
 SOUGHT_RAD: Final = np.radians(2.0)  #: standard deviation of a direction that was sought
 _BINDING_M: Final = 0.06  #: of a binding's marker from the axis of its ski, in any direction
@@ -70,7 +69,7 @@ class Bindings:
         Args:
             axes: (3, 3) forward, left and up as rows.
         """
-        mean, sigma = usual_difference(*(POINTS.index(label) for label in BINDINGS))
+        mean, sigma = usual_difference(*BINDINGS)
         apart, spread = mean @ axes, (axes.T * sigma**2) @ axes
         xyz, covariance, sharp = self.xyz.copy(), self.covariance.copy(), is_sharp(self.covariance)
         for k in range(SKIS):
@@ -98,12 +97,9 @@ def measure_skis(
     """
     pulses = [ski_views(views, window, flight, t, look) if steps[t] else [] for t in range(len(window))]
     bindings = bindings.side_by_side(flight.axes)
-    known, sharp = (
-        np.array([sought_from(of, bindings.at(t), sigma_m) for t, of in enumerate(pulses)])
-        for sigma_m in (_VAGUE_M, SHARP_M)
-    )
+    known = np.array([sought_from(of, bindings.at(t), _VAGUE_M) for t, of in enumerate(pulses)])
     # What is seen from a vague place alone may be the other ski.
-    known &= sharp.any(axis=1, keepdims=True)
+    known &= (known & is_sharp(bindings.covariance)).any(axis=1, keepdims=True)
     if not known.any():
         return [{} for _ in pulses]
     sought = seek_directions(pulses, bindings.xyz, bindings.covariance, known, window.time_s, flight.axes)

@@ -13,14 +13,14 @@ import numpy as np
 
 from analysis.candidates.model import Expected, PulseCandidates, SecondLook
 from analysis.identification.identify import named_pulse
-from analysis.identification.markers.markers import BINDINGS, Markers
+from analysis.identification.markers.markers import Markers
 from analysis.identification.over_time.assignment import MOST_VAGUE_M, assign, well_known
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Prediction
 from analysis.identification.over_time.window import Window
 from analysis.identification.seeking import Seeker
 from analysis.identification.ski_bars import MeasuredSkis, ski_views
-from analysis.identification.space.body import REACH_M
+from analysis.identification.space.body import BINDINGS, REACH_M
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, MeasuredCamera, PulseMeasurements

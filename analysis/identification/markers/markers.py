@@ -16,14 +16,12 @@ from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Part, PathFilter, Prediction, predict
 from analysis.identification.over_time.window import Window
 from analysis.identification.ski_bars import Bindings
-from analysis.identification.space.body import USUAL, implausibility
+from analysis.identification.space.body import BINDINGS, USUAL, implausibility
 from analysis.identification.space.sides import shown
 from analysis.identification.space.views import Views
 from analysis.measurements.model import POINTS
 from rig.arrays import Flags, Floats, Integers
 
-#: Indices of P3 and P4 in `POINTS`.
-BINDINGS = [2, 3]
 #: P1, P2, P3 and P4 as sums of P1, P2, the midpoint of the bindings and half the way from P3 to P4.
 _MIXING = np.array([(1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, -1.0), (0.0, 0.0, 1.0, 1.0)])
 ANYWHERE_M = 100.0

@@ -14,10 +14,11 @@ import numpy as np
 from analysis.candidates.markers.disc_profiles import BLUR_PX
 from analysis.candidates.markers.known_discs import DiscShape
 from analysis.candidates.model import SecondLook, Spots
-from analysis.identification.markers.markers import ANYWHERE_M, BINDINGS, Markers, settled_again
+from analysis.identification.markers.markers import ANYWHERE_M, Markers, settled_again
 from analysis.identification.over_time.assignment import well_known
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.window import Window
+from analysis.identification.space.body import BINDINGS
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Sight, Views
 from analysis.measurements.model import POINTS

@@ -28,6 +28,8 @@ _DISTANCES: Final = {
     ("P3", "P1"): (1.30, 0.27),
     ("P4", "P1"): (1.30, 0.27),
 }
+#: Indices of P3 and P4 in `POINTS`.
+BINDINGS: Final = [2, 3]
 #: Implausibility that nine in ten pairs of points of bodies stay below: chi-square, 4 degrees of freedom.
 USUAL = 7.8
 #: A jumper with skis is not longer than this, m.

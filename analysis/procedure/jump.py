@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from analysis.measurements.model import JumpMeasurements, Measurements
 from analysis.motion.smoother import Motion, smooth
 from analysis.procedure.contradictions import with_contradictions
-from analysis.procedure.names import only_told, told_names, untold_line
+from analysis.procedure.fates import fates_of
+from analysis.procedure.names import only_told, told_names, untold_line, untold_parts
 from analysis.procedure.verdict import judge
 from analysis.pulses.solution import RawJump, solve_pulses
+from analysis.result.fates import PartFate
 from analysis.result.model import CameraMove, CameraOffset, Jump, PulseState, Quantity, TakeOff, phase_at
 from analysis.scene.camera_system import CameraSystem
 from rig.clocks import NS_PER_S, UtcNs
@@ -40,16 +42,18 @@ def compute_jump(
         system: the cameras as they stood during the jump.
         moved: cameras that moved and whose pose was not corrected for it, for the verdict.
     """
+    everything, uncertain = jump, frozenset[str]()
     motion = smooth(jump, measurements, system)
     raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
     troubles = [] if motion.message is None else [motion.message]
     told = told_names(raw.states)
     if (untold := untold_line(raw.states, told)) is not None:
-        jump = only_told(jump, told)
+        jump, uncertain = only_told(jump, told), untold_parts(told)
         motion = smooth(jump, measurements, system)
         raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
         troubles = [untold] if not told or motion.message is None else [untold, motion.message]
-    pulses = with_contradictions(_pulse_states(jump, measurements, raw, motion))
+    fates = fates_of(everything, raw, motion.states, motion.removed, uncertain, system)
+    pulses = with_contradictions(_pulse_states(jump, measurements, raw, motion, fates))
     frames = [pulse.images.keys() for pulse in jump.pulses]
     verdict = judge(
         pulses,
@@ -71,7 +75,11 @@ def compute_jump(
 
 
 def _pulse_states(
-    jump: JumpMeasurements, measurements: Measurements, raw: RawJump, motion: Motion
+    jump: JumpMeasurements,
+    measurements: Measurements,
+    raw: RawJump,
+    motion: Motion,
+    fates: Sequence[Mapping[str, PartFate]],
 ) -> tuple[PulseState, ...]:
     return tuple(
         PulseState(
@@ -81,8 +89,9 @@ def _pulse_states(
             phase_at(since),
             state,
             smoothed,
+            of_pulse,
         )
-        for pulse, state, smoothed in zip(jump.pulses, raw.states, motion.states, strict=True)
+        for pulse, state, smoothed, of_pulse in zip(jump.pulses, raw.states, motion.states, fates, strict=True)
     )
 
 

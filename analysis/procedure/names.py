@@ -98,15 +98,22 @@ def untold_line(states: Sequence[JumperState], told: Collection[str]) -> Phrase 
     return phrase("jump_untold_points", "{which} are " + rest, which=which, points=points)
 
 
+def untold_parts(told: Collection[str]) -> frozenset[str]:
+    """Points and skis that are not given where only some names are told; no ski, where no binding tells which it is."""
+    given = {*told, *(SIDES if any(binding in told for binding, _ in _BINDINGS) else ())}
+    return frozenset((*POINTS, *SIDES)) - given
+
+
 def only_told(jump: JumpMeasurements, told: Collection[str]) -> JumpMeasurements:
-    """The jump with the told points alone; without any skis where no binding tells which ski is which."""
-    skis = any(binding in told for binding, _ in _BINDINGS)
+    """The jump without `untold_parts`."""
+    untold = untold_parts(told)
     pulses = (
         replace(
             pulse,
             images={
                 camera: ImageMeasurements(
-                    {name: point for name, point in image.points.items() if name in told}, image.skis if skis else {}
+                    {name: point for name, point in image.points.items() if name not in untold},
+                    {side: ski for side, ski in image.skis.items() if side not in untold},
                 )
                 for camera, image in pulse.images.items()
             },
@@ -132,13 +139,13 @@ def measured_parts(state: JumperState) -> JumperState:
 
 def told_state(state: SmoothedState, told: Collection[str]) -> SmoothedState:
     """A state without the points that are not told, and without what follows from them."""
-    given = {*told, *(SIDES if any(binding in told for binding, _ in _BINDINGS) else ())}
-    missing = [not given.issuperset(NEEDS.get(name, ())) for name in QUANTITIES]
+    untold = untold_parts(told)
+    missing = [not untold.isdisjoint(NEEDS.get(name, ())) for name in QUANTITIES]
     lost = {name for name, gone in zip(QUANTITIES, missing, strict=True) if gone}
     return replace(
         state,
-        points={name: point if name in given else None for name, point in state.points.items()},
-        skis={side: ski if side in given else None for side, ski in state.skis.items()},
+        points={name: None if name in untold else point for name, point in state.points.items()},
+        skis={side: None if side in untold else ski for side, ski in state.skis.items()},
         angles={name: None if name in lost else angle for name, angle in state.angles.items()},
         height=None if "height" in lost else state.height,
         speed=None if "speed" in lost else state.speed,

@@ -22,7 +22,7 @@ from analysis.result.model import (
     Verdict,
 )
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
-from rig.arrays import Flags, Floats
+from rig.arrays import Floats
 from rig.phrase import NOTHING, Phrase, phrase
 from rig.phrases import enumerated, in_turn
 
@@ -183,7 +183,7 @@ def in_sight(pulse: PulseState, system: CameraSystem) -> bool:
     places = _places(pulse)
     if not len(places):
         return True  # nothing is known: it counts as a pulse that was not solved
-    seen = sum(_inside(placed, places).astype(int) for placed in system.cameras.values())
+    seen = sum(placed.shows(places).astype(int) for placed in system.cameras.values())
     return bool((np.asarray(seen) >= _CAMERAS).all())
 
 
@@ -203,7 +203,7 @@ def _contradicting(
     lines = []
     for name, placed in cameras.items():
         places = [_places(pulse) for pulse, frames in delivered if name in frames]
-        there = sum(int(_inside(placed, of_pulse).sum()) for of_pulse in places if len(of_pulse))
+        there = sum(int(placed.shows(of_pulse).sum()) for of_pulse in places if len(of_pulse))
         if there >= _ENOUGH and used[name] < _FITTING * there:
             text = (
                 "camera {camera} has the jumper's points in its images {there} times, and only {used} times where the "
@@ -217,13 +217,6 @@ def _places(pulse: PulseState) -> Floats:
     """(n, 3) the points of a pulse, measured or predicted."""
     state = pulse.smoothed or pulse.raw
     return np.array([point.xyz for point in state.points.values() if point is not None]).reshape(-1, 3)
-
-
-def _inside(placed: PlacedCamera, places: Floats) -> Flags:
-    """(n,) which points lie within a camera's image."""
-    xy = placed.project(places)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(((xy >= 0) & (xy <= placed.size - 1)).all(axis=1))
 
 
 def _too_few(of_phase: Mapping[str, Any], what: str, words: Phrase, where: Phrase) -> list[Phrase]:

@@ -100,6 +100,6 @@ def _without(objects: Objects, checked: Checked, lost: Integers) -> Checked:
     """What was found, without some objects."""
     adjusted = checked.adjusted
     condition, used, removed = adjusted.condition.copy(), checked.used.copy(), checked.removed.copy()
-    condition[lost] = Condition.IMPOSSIBLE
+    condition[lost] = Condition.UNCONTROLLED
     used[lost], removed[lost] = False, objects.seen[lost]
     return replace(checked, adjusted=replace(adjusted, condition=condition), used=used, removed=removed)

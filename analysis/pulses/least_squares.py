@@ -31,7 +31,8 @@ class Condition(IntEnum):
     OK = 0
     FEW_IMAGES = 1  #: in sight of fewer than two cameras
     UNDETERMINED = 2  #: the rays or planes coincide within their accuracy
-    IMPOSSIBLE = 3  #: behind a camera, or the iteration does not converge
+    IMPOSSIBLE = 3  #: behind a camera, the iteration does not converge, or images contradict each other
+    UNCONTROLLED = 4  #: too few images control it, and the motion over time contradicts it
 
 
 @dataclass(frozen=True, slots=True, eq=False)

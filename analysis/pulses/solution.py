@@ -8,7 +8,7 @@ import numpy as np
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, PulseMeasurements
 from analysis.pulses.giving_up import ExpectedPoints, ExpectedSkis, give_up_points, give_up_skis
 from analysis.pulses.gross_errors import Checked, check_points, check_skis
-from analysis.pulses.least_squares import adjust
+from analysis.pulses.least_squares import Condition, adjust
 from analysis.pulses.points import points_of
 from analysis.pulses.scaling import scaled_to_fit
 from analysis.pulses.skis import skis_of
@@ -31,12 +31,14 @@ class RawJump:
         states: one for each pulse of the measurements, in order, at the middle of the exposures.
         tests: of all rays and image lines, the worst first. Where an error was found, but not the wrong ray, all rays
             of that point are removed.
+        conditions: of P1 to P4 and the skis, pulse by pulse.
         scale: factors by which the sigmas of "points" and "skis" in the images were too small: if they are not 1, most
             of them agree worse than their sigmas said, and all results are computed with these sigmas times the factor.
     """
 
     states: tuple[JumperState, ...]
     tests: tuple[RayTest, ...]
+    conditions: tuple[Mapping[str, Condition], ...] = ()
     scale: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -86,7 +88,15 @@ def solve_pulses(
     solved = Solved(good_points, points.by_hand, good_skis, skis.by_hand)
     tests = sorted(_tests(solved, pulses, system.names), key=lambda test: (np.isnan(test.w), -test.w))
     scale = {"points": points_scale, "skis": skis_scale}
-    return RawJump(jumper_states(solved, numbers, times, system), tuple(tests), scale)
+    return RawJump(jumper_states(solved, numbers, times, system), tuple(tests), _conditions(solved), scale)
+
+
+def _conditions(solved: Solved) -> tuple[dict[str, Condition], ...]:
+    """Of points and skis, pulse by pulse."""
+    points = solved.points.adjusted.condition.reshape(-1, len(POINTS))
+    skis = solved.skis.adjusted.condition.reshape(-1, len(SIDES))
+    both = np.concatenate((points, skis), axis=1)
+    return tuple(dict(zip((*POINTS, *SIDES), map(Condition, row), strict=True)) for row in both.tolist())
 
 
 def _expected_points(

@@ -136,11 +136,13 @@ def _scrubber(of: JumpShown) -> str:
 
 
 _SCRUBBING: Final = Said(
-    "Lines: stick model projected into the image; crosses and dots: measured there; ellipses: "
+    "Lines: stick model projected into the image; crosses and dots: measured there, crosses that "
+    "are turned: not used, the protocol says why; ellipses: "
     f"{ELLIPSE_SIGMAS:g} times the standard deviation, dashed where nothing was measured. Time and distance count "
     f"from the take-off. Numbers in italics: a point is uncertain by more than {LARGEST_SIGMA_M * 10:g} dm. Tap a view "
     "to enlarge it. Arrow keys step, space plays in slow motion.",
-    f"Linjer: strekfiguren tegnet inn i bildet; kryss og prikker: målt der; ellipser: {_comma(ELLIPSE_SIGMAS)} ganger "
+    f"Linjer: strekfiguren tegnet inn i bildet; kryss og prikker: målt der, kryss på skrå: ikke "
+    f"brukt, protokollen sier hvorfor; ellipser: {_comma(ELLIPSE_SIGMAS)} ganger "
     "standardavviket, stiplet der ingenting ble målt. Tid og avstand regnes fra satsen. Tall i kursiv: et punkt er "
     f"mer usikkert enn {_comma(LARGEST_SIGMA_M * 10)} dm. Trykk på et bilde for å gjøre det stort. Piltastene går ett "
     "steg, mellomrom spiller i sakte film.",

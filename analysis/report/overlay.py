@@ -1,6 +1,6 @@
 """What is drawn over an image: measured points, the projected stick model, and how sure its points are."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.measurements.model import ImageMeasurements
 from analysis.report.course import origin_of
+from analysis.result.fates import ImageFate, PartFate
 from analysis.result.model import JumperState, Status
 from analysis.scene.camera_system import PlacedCamera
 from rig.arrays import Floats
@@ -29,6 +30,8 @@ SKI_LENGTH_M = 2.63
 ELLIPSE_SIGMAS = 10.0
 #: Bits of sub-pixels when OpenCV draws.
 SHIFT = 4
+_DIAGONAL = float(np.sqrt(0.5))
+_REFUSED: Final = (ImageFate.GROSS_ERROR, ImageFate.NOT_USED, ImageFate.RAW_ONLY)
 _ALONG = np.linspace(0.0, 1.0, 9)[:, None]  # a straight line may be bent by the lens
 
 
@@ -42,6 +45,7 @@ class Overlay:
         points: measured points (2,) by name.
         skis: measured points (k, 2) of the skis by side.
         predicted: points that were not measured at this pulse.
+        refused: measured points that are not used.
     """
 
     lines: Mapping[str, Floats]
@@ -49,6 +53,7 @@ class Overlay:
     points: Mapping[str, Floats]
     skis: Mapping[str, Floats]
     predicted: frozenset[str]
+    refused: frozenset[str] = frozenset()
 
     def places(self) -> Floats:
         """All places (n, 2), n >= 0."""
@@ -64,7 +69,19 @@ class Overlay:
             {name: (xy - origin) * scale for name, xy in self.points.items()},
             {side: (xy - origin) * scale for side, xy in self.skis.items()},
             self.predicted,
+            self.refused,
         )
+
+    def crosses(self, half: float) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+        """The two lines of each measured point, from where to where: upright crosses, turned ones where it is refused.
+
+        Args:
+            half: half the length of a line, px.
+        """
+        for name, (x, y) in self.points.items():
+            dx, dy = (half * _DIAGONAL, half * _DIAGONAL) if name in self.refused else (half, 0.0)
+            yield (x - dx, y - dy), (x + dx, y + dy)
+            yield (x + dy, y - dx), (x - dy, y + dx)
 
 
 def stick_lines(state: JumperState) -> dict[str, Floats]:
@@ -88,14 +105,21 @@ def stick_lines(state: JumperState) -> dict[str, Floats]:
     return lines
 
 
-def overlay_of(state: JumperState, measured: ImageMeasurements | None, camera: PlacedCamera) -> Overlay:
+def overlay_of(
+    state: JumperState,
+    measured: ImageMeasurements | None,
+    camera: PlacedCamera,
+    fates: Mapping[str, PartFate] | None = None,
+) -> Overlay:
     """What is drawn over an image.
 
     Args:
         state: the jumper at this pulse.
         measured: what was measured in this image.
         camera: that took it.
+        fates: what became of it.
     """
+    images = {} if fates is None else {what: part.images.get(camera.name) for what, part in fates.items()}
     projected = {part: camera.project(_dense(line)) for part, line in stick_lines(state).items()}
     points = {} if measured is None else {name: point.xy for name, point in measured.points.items()}
     skis = {} if measured is None else {side: ski.xy for side, ski in measured.skis.items()}
@@ -105,6 +129,7 @@ def overlay_of(state: JumperState, measured: ImageMeasurements | None, camera: P
         points,
         skis,
         frozenset(n for n, point in state.points.items() if point is not None and point.status is Status.PREDICTED),
+        frozenset(what for what, fate in images.items() if fate in _REFUSED),
     )
 
 

@@ -6,13 +6,14 @@ written anew then; what was noted about an athlete is for nobody who opens the l
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, Measurements, Source
+from analysis.report.fates import WHY, fates_drawing, why_missing
 from analysis.report.figures import fixed
 from analysis.report.protocol_norwegian import norwegian
 from analysis.result.model import (
@@ -26,15 +27,14 @@ from analysis.result.model import (
     Status,
 )
 from photogrammetry.procedures.orientation import Orientation
-from photogrammetry.reports.document import Report, Section, Table, write_report
+from photogrammetry.reports.document import Drawing, Report, Section, Table, write_report
 from photogrammetry.reports.procedures import orientation_report
 from rig.errors import BadInputError
 
 #: How many rays are listed; what was removed is listed whole.
 WORST_RAYS = 40
-_FEWEST_IMAGES = 2  # that fix a point or a ski in space
 _MM = 1000.0
-Part = str | Table
+Part = str | Table | Drawing
 
 
 def write_protocol(
@@ -156,7 +156,7 @@ def _jump(jump: Jump, measured: JumpMeasurements | None, rate_hz: float) -> list
         Section(f"Jump {jump.number}: verdict", tuple(_verdict(jump, rate_hz))),
         Section(f"Jump {jump.number}: what was measured", tuple(_coverage(jump, measured))),
         Section(f"Jump {jump.number}: tests of rays, the worst first", tuple(_tests(jump))),
-        Section(f"Jump {jump.number}: refused, and why", tuple(_refused(jump, measured))),
+        Section(f"Jump {jump.number}: what is missing, and why", tuple(_refused(jump))),
     ]
 
 
@@ -258,25 +258,18 @@ def _row(test: RayTest) -> tuple[str, ...]:
     return str(test.pulse), test.camera, test.what, fixed(test.residual_px, 2), fixed(test.w, 1), removed
 
 
-def _refused(jump: Jump, measured: JumpMeasurements | None) -> Iterable[Part]:
+def _refused(jump: Jump) -> Iterable[Part]:
     """What was left out as a gross error, what could not be controlled, and what was not solved."""
-    images: dict[int, Counter[str]] = {}
-    for pulse in () if measured is None else measured.pulses:
-        count = images.setdefault(pulse.pulse, Counter())
-        for image in pulse.images.values():
-            count.update([*image.points, *image.skis])
+    drawing = fates_drawing(jump)
+    if drawing is not None:
+        yield drawing
     removed = [test for test in jump.tests if test.removed]
     if removed:
         yield f"{len(removed)} rays or image lines were left out as gross errors:"
         yield Table(("pulse", "camera", "what", "residual (px)", "w", ""), tuple(_row(test) for test in removed))
+    for what, fate, pulses in why_missing(jump):
+        yield f"{what}: no raw solution at {_ranges(pulses)}: {WHY[fate]}"
     for name in (*POINTS, *SIDES):
-        missing = [pulse for pulse in jump.pulses if _member(pulse.raw, name) is None]
-        unseen = [pulse for pulse in missing if images.get(pulse.pulse, Counter())[name] < _FEWEST_IMAGES]
-        if unseen:
-            yield f"{name}: measured in fewer than two images, so no solution from single pulses at {_ranges(unseen)}"
-        refused = [pulse for pulse in missing if pulse not in unseen]
-        if refused:
-            yield f"{name}: measured in two images or more, but no solution was accepted at {_ranges(refused)}"
         two = [pulse for pulse in jump.pulses if _member(pulse.raw, name) is Status.TWO_RAYS]
         if two:
             yield f"{name}: two rays, not controllable, at {_ranges(two)}"
@@ -285,7 +278,7 @@ def _refused(jump: Jump, measured: JumpMeasurements | None) -> Iterable[Part]:
         yield f"no values from the model over time at {_ranges(unsmoothed)}"
 
 
-def _ranges(pulses: list[PulseState]) -> str:
+def _ranges(pulses: Sequence[PulseState]) -> str:
     """`pulses 12, 14-17`."""
     numbers = [int(pulse.pulse) for pulse in pulses]
     runs: list[list[int]] = []

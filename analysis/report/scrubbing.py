@@ -48,7 +48,8 @@ def overlays_of(
         pulse = course.pulses[i]
         images = by_pulse.get(int(pulse.pulse), {})
         found[int(pulse.pulse)] = {
-            name: overlay_of(best_state(pulse), images.get(name), camera) for name, camera in system.cameras.items()
+            name: overlay_of(best_state(pulse), images.get(name), camera, pulse.fates)
+            for name, camera in system.cameras.items()
         }
     return found
 
@@ -98,9 +99,9 @@ def overlay_svg(overlay: Overlay) -> str:
         parts.append(f'<ellipse{kind} rx="{long:.1f}" ry="{short:.1f}" transform="{move}"/>')
     for side, points in overlay.skis.items():
         parts += [f'<circle class="{side}" cx="{x:.1f}" cy="{y:.1f}" r="1.2"/>' for x, y in points]
-    for x, y in overlay.points.values():
-        cross = f"M{x - _CROSS:.1f} {y:.1f}h{2 * _CROSS:g}M{x:.1f} {y - _CROSS:.1f}v{2 * _CROSS:g}"
-        parts.append(f'<path class="halo" d="{cross}"/><path class="point" d="{cross}"/>')
+    crosses = "".join(f"M{x:.1f} {y:.1f}L{to_x:.1f} {to_y:.1f}" for (x, y), (to_x, to_y) in overlay.crosses(_CROSS))
+    if crosses:
+        parts.append(f'<path class="halo" d="{crosses}"/><path class="point" d="{crosses}"/>')
     return "".join(parts)
 
 

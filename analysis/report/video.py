@@ -200,10 +200,8 @@ def _draw(block: _Picture, overlay: Overlay, width: int) -> None:
             size = (fine(np.array(long)).item(), fine(np.array(short)).item())
             centre = tuple(fine(place).tolist())
             cv2.ellipse(block, centre, size, turn, 0, 360, _INK, 1, cv2.LINE_AA, SHIFT)
-    for x, y in overlay.points.values():
-        for dx, dy in ((3.0 * width, 0.0), (0.0, 3.0 * width)):
-            ends = fine(np.array([(x - dx, y - dy), (x + dx, y + dy)]))
-            cv2.polylines(block, [ends], False, _POINT, width, cv2.LINE_AA, SHIFT)
+    for ends in overlay.crosses(3.0 * width):
+        cv2.polylines(block, [fine(np.array(ends))], False, _POINT, width, cv2.LINE_AA, SHIFT)
     for side, points in overlay.skis.items():
         for x, y in fine(points):
             cv2.circle(block, (int(x), int(y)), width << SHIFT, _COLOURS[side], -1, cv2.LINE_AA, SHIFT)

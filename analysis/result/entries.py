@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct, field
 
+from analysis.result.fates import Fate, ImageFate, PartFate
 from analysis.result.model import (
     QUANTITIES,
     BallResult,
@@ -98,6 +99,13 @@ class SmoothedEntry(StateEntry):
     by_calibration: Annotated[list[list[float] | None], Meta(min_length=len(QUANTITIES), max_length=len(QUANTITIES))]
 
 
+class FateEntry(Struct):
+    """One of `fates`."""
+
+    fate: Fate
+    images: dict[str, ImageFate]
+
+
 class PulseEntry(StateEntry):
     """One of `pulses`."""
 
@@ -106,6 +114,7 @@ class PulseEntry(StateEntry):
     since_takeoff_s: Number
     phase: Phase
     smoothed: SmoothedEntry | None
+    fates: dict[str, FateEntry] = {}
 
 
 class TakeOffEntry(Struct):
@@ -300,6 +309,7 @@ def _pulse(entry: PulseEntry, parameters: int) -> PulseState:
         entry.phase,
         JumperState(*_state(entry)),
         None if entry.smoothed is None else _smoothed(entry.smoothed, entry.pulse, parameters),
+        {what: PartFate(part.fate, part.images) for what, part in entry.fates.items()},
     )
 
 

@@ -188,6 +188,10 @@ def _pulse(pulse: PulseState) -> dict[str, Any]:
         "phase": str(pulse.phase),
         **_state(pulse.raw),
         "smoothed": None if pulse.smoothed is None else _smoothed(pulse.smoothed),
+        "fates": {
+            what: {"fate": str(part.fate), "images": {name: str(fate) for name, fate in part.images.items()}}
+            for what, part in pulse.fates.items()
+        },
     }
 
 

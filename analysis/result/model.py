@@ -4,12 +4,13 @@ Lengths m, speeds m/s; angles and their sigmas here in degrees, as in the file. 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Final
 
 import numpy as np
 
+from analysis.result.fates import PartFate
 from rig.arrays import Floats
 from rig.clocks import UtcNs
 from rig.phrase import Phrase
@@ -180,6 +181,7 @@ class PulseState:
         phase: of the jump.
         raw: solution of this pulse alone; its speed is the central difference of O.
         smoothed: from the model over time; None where there is none.
+        fates: what became of P1 to P4 and the skis; nothing in a file from before they were written.
     """
 
     pulse: PulseNumber
@@ -188,6 +190,7 @@ class PulseState:
     phase: Phase
     raw: JumperState
     smoothed: SmoothedState | None
+    fates: Mapping[str, PartFate] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,6 +83,12 @@ class PlacedCamera:
         """Whether object points (..., 3) lie before the camera."""
         return np.asarray(camera_coordinates(self.rotation, self.position, np.asarray(xyz, float))[..., 2] < 0)
 
+    def shows(self, xyz: ArrayLike) -> Flags:
+        """(n,) whether points (n, 3) lie within the image."""
+        xy = self.project(xyz)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(((xy >= 0) & (xy <= self.size - 1)).all(axis=-1))
+
     def shifted(self, px: Floats) -> "PlacedCamera":
         """The camera of a frame that shows everything so many px (2,) beside where this one shows it."""
         interior = self.camera.interior.copy()

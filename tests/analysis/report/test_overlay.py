@@ -1,11 +1,14 @@
 """Overlays: projected where the camera sees them, with the covariance that many draws show."""
 
+import math
+
 import numpy as np
 import pytest
 
 from analysis.report.course import best_state
 from analysis.report.crops import CROP_HEIGHT, CROP_WIDTH, windows_of
 from analysis.report.overlay import SKI_LENGTH_M, half_axes, overlay_of, stick_lines
+from analysis.result.fates import Fate, ImageFate, PartFate
 from tests.analysis.report.jumps import measured_recording, measurements
 from tests.analysis.simulated import true_cameras
 
@@ -67,3 +70,15 @@ def test_all_windows_of_a_camera_are_equally_large_and_within_the_image() -> Non
         width, height = system[name].size
         assert all(w.left >= 0 and w.left + w.width <= width for w in own)
         assert all(w.top >= 0 and w.top + w.height <= height for w in own)
+
+
+def test_what_is_measured_and_not_used_has_a_turned_cross() -> None:
+    camera, measured = true_cameras()["K1"], measurements().jumps[0].pulses[20].images["K1"]
+    overlay = overlay_of(STATE, measured, camera, {"P1": PartFate(Fate.USED, {"K1": ImageFate.GROSS_ERROR})})
+    lines = list(overlay.crosses(4.0))
+    assert {"P1", "P2"} <= set(overlay.points)
+    assert len(lines) == 2 * len(overlay.points)
+    for i, name in enumerate(overlay.points):
+        for (x, y), (to_x, to_y) in lines[2 * i : 2 * i + 2]:
+            assert math.hypot(to_x - x, to_y - y) == pytest.approx(8.0)
+            assert bool(min(abs(to_x - x), abs(to_y - y)) > 1.0) == (name == "P1")

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.report.fates import CAPTION, WHY
 from analysis.report.protocol import WORST_RAYS, protocol, write_protocol
 from analysis.report.protocol_norwegian import norwegian
+from analysis.result.fates import Fate
 from analysis.result.model import CameraMove, CameraOffset, MeasuredRecording, RayTest
 from photogrammetry.procedures.orientation import orient
 from photogrammetry.reports.document import Report, Table, as_text
@@ -71,16 +73,16 @@ def test_rays_are_listed_worst_first_and_removed_ones_whole() -> None:
     assert values == sorted(values, reverse=True)
     assert f"{np.count_nonzero(np.abs(w) > 2)} of them with |w| > 2" in text
     assert "1 are controlled by nothing" in text
-    refused = _section(text, "Jump 1: refused, and why")
+    refused = _section(text, "Jump 1: what is missing, and why")
     assert "3 rays or image lines were left out as gross errors" in refused
     assert refused.count("removed") == 3
 
 
 def test_what_has_no_solution_is_named_with_its_pulses() -> None:
     first = measured_recording().jumps[0].pulses[0].pulse
-    refused = _section(_text(measured_recording()), "Jump 1: refused, and why")
+    refused = _section(_text(measured_recording()), "Jump 1: what is missing, and why")
     gap = f"pulses {first + 14}-{first + 18}"
-    assert f"P1: measured in two images or more, but no solution was accepted at {gap}" in refused
+    assert f"P1: no raw solution at {gap}: {WHY[Fate.DISAGREE]}" in refused
     assert f"P4: two rays, not controllable, at pulses {first + 8}-{first + 11}" in refused
 
 
@@ -139,3 +141,12 @@ def _texts(report: Report) -> Iterator[str]:
                 yield from (*part.head, *(cell for row in part.rows for cell in row))
             else:
                 yield part if isinstance(part, str) else part.caption
+
+
+def test_the_page_draws_what_became_of_each_point(tmp_path: Path) -> None:
+    result = measured_recording()
+    _, page = write_protocol(result, measurements(), tmp_path)
+    text = page.read_text()
+    assert text.count(f'aria-label="{CAPTION}"') == len(result.jumps)
+    bare = replace(result.jumps[0], pulses=tuple(replace(p, fates={}) for p in result.jumps[0].pulses))
+    assert "What became of each point" not in _text(replace(result, jumps=(bare,)))

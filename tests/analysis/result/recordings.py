@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from analysis.measurements.model import POINTS, SIDES
+from analysis.result.fates import Fate, ImageFate, PartFate
 from analysis.result.model import (
     BallResult,
     CameraOffset,
@@ -180,6 +181,19 @@ def _seen(place: int, i: int) -> bool:
     return not (place >= 6 and LEFT_SKI_GAP[0] <= i < LEFT_SKI_GAP[1])
 
 
+def _fates(raw: JumperState) -> dict[str, PartFate]:
+    """Used, or refused; every camera measured."""
+    parts: dict[str, PointState | SkiState | None] = {**raw.points, **raw.skis}
+    return {
+        what: PartFate(Fate.DISAGREE, dict.fromkeys(true_cameras().names, ImageFate.NOT_USED))
+        if part is None
+        else PartFate(
+            Fate.USED, {n: ImageFate.USED if n in part.cameras else ImageFate.NOT_FOUND for n in true_cameras().names}
+        )
+        for what, part in parts.items()
+    }
+
+
 def _jump(jump_seed: int, leg_deg: float, rng: np.random.Generator, error: Floats | None, number: int) -> Jump:
     m, (raw_spreads, smoothed_spreads) = model(jump_seed, leg_deg), _spreads(jump_seed, leg_deg)
     n = len(m.pulses)
@@ -198,8 +212,9 @@ def _jump(jump_seed: int, leg_deg: float, rng: np.random.Generator, error: Float
                 UtcNs(START_NS + round(pulse * 1e9 / RATE_HZ)),
                 since,
                 phase_at(since),
-                _raw(i, raw, raw_spreads[i]),
+                alone := _raw(i, raw, raw_spreads[i]),
                 _state(i, smoothed[i], velocity[i], smoothed_spreads[i]),
+                _fates(alone),
             )
         )
     time = UtcNs(START_NS + round(takeoff * 1e9 / RATE_HZ))

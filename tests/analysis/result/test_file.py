@@ -55,6 +55,9 @@ def test_what_was_not_measured_is_null_in_the_raw_part_and_predicted_in_the_smoo
     pulses = to_json(measured)["jumps"][0]["pulses"]
     hidden = pulses[HELMET_GAP[0]]
     assert hidden["points"]["P1"] is None
+    assert hidden["fates"]["P1"]["fate"] == "images disagree"
+    assert set(hidden["fates"]["P1"]["images"].values()) == {"not used"}
+    assert hidden["fates"]["P2"]["fate"] == "used"
     assert hidden["angles"]["beta"] is None
     assert hidden["smoothed"]["points"]["P1"]["status"] == "predicted"
     assert pulses[LEFT_SKI_GAP[0]]["skis"]["left"] is None
@@ -139,3 +142,13 @@ def _assert_same(one: Any, other: Any) -> None:
             _assert_same(a, b)
     else:
         assert one == other or (np.isnan(one) and np.isnan(other))
+
+
+def test_a_result_from_before_the_fates_is_read(measured: MeasuredRecording, tmp_path: Path) -> None:
+    data = to_json(measured)
+    for jump in data["jumps"]:
+        for pulse in jump["pulses"]:
+            del pulse["fates"]
+    path = tmp_path / "jumper.json"
+    path.write_text(json.dumps(data))
+    assert all(not pulse.fates for jump in read(path).jumps for pulse in jump.pulses)

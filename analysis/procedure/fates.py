@@ -4,10 +4,10 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, PulseMeasurements
+from analysis.motion.smoother import Motion
 from analysis.pulses.least_squares import Condition
-from analysis.pulses.solution import RawJump
 from analysis.result.fates import Fate, ImageFate, PartFate
-from analysis.result.model import JumperState, RayTest, SmoothedState
+from analysis.result.model import JumperState, SmoothedState
 from analysis.scene.camera_system import CameraSystem
 from rig.pulse import PulseNumber
 
@@ -21,29 +21,28 @@ _REFUSED: Final = {
 
 def fates_of(
     jump: JumpMeasurements,
-    raw: RawJump,
-    smoothed: Sequence[SmoothedState | None],
-    removed: Collection[RayTest],
-    uncertain: Collection[str],
+    raw: Sequence[JumperState],
+    conditions: Sequence[Mapping[str, Condition]],
+    motion: Motion,
     system: CameraSystem,
 ) -> list[dict[str, PartFate]]:
     """What became of points and skis, pulse by pulse.
 
     Args:
         jump: everything that was measured in its images.
-        raw: its raw solution.
-        smoothed: its states from the model over time, whose places say what is in sight.
-        removed: what the model over time left out as gross errors.
-        uncertain: points and skis that were measured, but not given, as their names are uncertain.
+        raw: its raw states.
+        conditions: of points and skis in the adjustment of each pulse; one that is in order and has no raw state is
+            not given, as its name is uncertain.
+        motion: the model over time: what it left out, and places that say what is in sight.
         system: the oriented cameras.
     """
-    left_out = {(test.pulse, test.camera, test.what) for test in removed}
+    left_out = {(test.pulse, test.camera, test.what) for test in motion.removed}
     return [
         {
-            what: _fate(what, pulse, _solved(state, what), conditions[what], model, left_out, uncertain, system)
+            what: _fate(what, pulse, _solved(state, what), of_pulse[what], smoothed, left_out, system)
             for what in (*POINTS, *SIDES)
         }
-        for pulse, state, conditions, model in zip(jump.pulses, raw.states, raw.conditions, smoothed, strict=True)
+        for pulse, state, of_pulse, smoothed in zip(jump.pulses, raw, conditions, motion.states, strict=True)
     ]
 
 
@@ -60,7 +59,6 @@ def _fate(
     condition: Condition,
     smoothed: SmoothedState | None,
     left_out: Collection[tuple[PulseNumber, str, str]],
-    uncertain: Collection[str],
     system: CameraSystem,
 ) -> PartFate:
     place = None if smoothed is None else smoothed.points.get(_BINDINGS.get(what, what))
@@ -75,23 +73,17 @@ def _fate(
         else:
             shown = place is None or bool(camera.shows(place.xyz))
             images[name] = ImageFate.NOT_FOUND if shown else ImageFate.OUT_OF_SIGHT
-    return PartFate(_of_part(what, used, condition, images, uncertain), images)
+    return PartFate(_of_part(used, condition, images), images)
 
 
-def _of_part(
-    what: str,
-    used: Collection[str],
-    condition: Condition,
-    images: Mapping[str, ImageFate],
-    uncertain: Collection[str],
-) -> Fate:
+def _of_part(used: Collection[str], condition: Condition, images: Mapping[str, ImageFate]) -> Fate:
     if used:
         return Fate.USED
-    fates = list(images.values())
-    if what in uncertain and ImageFate.NOT_USED in fates:
+    if condition is Condition.OK:
         return Fate.NAME
     if condition in _REFUSED:
         return _REFUSED[condition]
+    fates = list(images.values())
     if fates.count(ImageFate.NOT_USED) > 1:
         return Fate.UNDETERMINED  # what was measured of a ski is too short
     within = sum(fate in (ImageFate.NOT_USED, ImageFate.NOT_FOUND) for fate in fates)

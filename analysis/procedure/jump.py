@@ -44,7 +44,7 @@ def compute_jump(
     """
     everything, uncertain = jump, frozenset[str]()
     motion = smooth(jump, measurements, system)
-    raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
+    first = raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
     troubles = [] if motion.message is None else [motion.message]
     told = told_names(raw.states)
     if (untold := untold_line(raw.states, told)) is not None:
@@ -52,7 +52,11 @@ def compute_jump(
         motion = smooth(jump, measurements, system)
         raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
         troubles = [untold] if not told or motion.message is None else [untold, motion.message]
-    fates = fates_of(everything, raw, motion.states, motion.removed, uncertain, system)
+    conditions = [
+        {what: (before if what in uncertain else now)[what] for what in now}
+        for before, now in zip(first.conditions, raw.conditions, strict=True)
+    ]
+    fates = fates_of(everything, raw.states, conditions, motion, system)
     pulses = with_contradictions(_pulse_states(jump, measurements, raw, motion, fates))
     frames = [pulse.images.keys() for pulse in jump.pulses]
     verdict = judge(

@@ -26,7 +26,7 @@ from analysis.motion.start_values import FEWEST, Start, start_values
 from analysis.motion.synchrony import Synchrony, judged
 from analysis.motion.table import TableMotion, table_motion
 from analysis.motion.takeoff import Break, airborne, find_break, passing
-from analysis.result.model import CameraOffset, Phase, RayTest, SmoothedState, TakeOff, phase_at
+from analysis.result.model import CameraOffset, Phase, Quantity, RayTest, SmoothedState, TakeOff, phase_at
 from analysis.scene.camera_arrays import CameraArrays, own_root
 from analysis.scene.camera_system import CameraSystem
 from rig.arrays import Floats
@@ -68,6 +68,7 @@ class Motion:
         scale: factors by which the sigmas of "points" and "skis" in the images were too small: if not 1, most of them
             agree worse than their sigmas said, and all results are computed with these sigmas times the factor.
         message: why there are no states; None where there are.
+        late: of cameras that are not synchronous how late they are, s.
     """
 
     states: Sequence[SmoothedState | None]
@@ -78,6 +79,7 @@ class Motion:
     table: TableMotion | None
     scale: Mapping[str, float] = field(default_factory=dict)
     message: Phrase | None = None
+    late: Mapping[str, Quantity] = field(default_factory=dict)
 
 
 def smooth(
@@ -140,6 +142,10 @@ def _motion(
         _removed(adjusted, [int(pulse.pulse) for pulse in jump.pulses[sight]]),
         None if takeoff is None else table_motion(adjusted, takeoff),
         {"points": float(factors[0]), "skis": float(factors[-1])},
+        late={
+            observed.names[i]: Quantity(float(synchrony.lateness[i]), float(synchrony.sigma[i]))
+            for i in np.flatnonzero(synchrony.late)
+        },
     )
 
 
@@ -176,7 +182,8 @@ def _with_free_cameras(
 def _synchronised(free: Adjusted, synchrony: Synchrony) -> Adjusted:
     """The bundle with cameras that obey the trigger; a camera that is late keeps its own lateness as an unknown."""
     unit = free.model.prior.unit
-    sigma = np.where(synchrony.late, _FREE_FRAMES, _TRIGGER_S / unit)
+    unknown = _FREE_FRAMES if synchrony.told else synchrony.sigma / unit
+    sigma = np.where(synchrony.late, unknown, _TRIGGER_S / unit)
     expected = np.where(synchrony.late, synchrony.lateness / unit, 0.0)
     model = replace(free.model, late=expected, late_sigma=sigma, clock_is_mean=False)
     shared = free.shared.copy()

@@ -28,12 +28,17 @@ class Synchrony:
     Attributes:
         offsets: by camera.
         late: (m,) which cameras are not synchronous.
-        lateness: (m,) relative to the reference, s.
+        lateness: (m,) relative to the reference, s; to the mean of all where no two cameras agree.
+        sigma: (m,) standard deviation of it, s.
+        told: whether cameras agree, so that the others are known to be the late ones. Of two that differ nobody knows
+            which it is: then the sigma is that of a mean instant that is as far off as they are apart.
     """
 
     offsets: dict[str, CameraOffset]
     late: Flags
     lateness: Floats
+    sigma: Floats
+    told: bool
 
 
 def judged(
@@ -53,7 +58,7 @@ def judged(
     reference = _reference(able, lateness, covariance)
     limit = -float(ndtri(FALSE_ALARM_P / (2 * m)))
     offsets: dict[str, CameraOffset] = {}
-    late, relative = np.zeros(m, bool), np.zeros(m)
+    late, relative, sigmas = np.zeros(m, bool), np.zeros(m), np.zeros(m)
     for i in able if len(able) > 1 else []:
         name = names[i]
         others = [k for k in reference if k != i] or [k for k in able if k != i]
@@ -61,11 +66,17 @@ def judged(
         contrast[i] = 1.0
         contrast[others] = -_weights(covariance, others)
         value, sigma = float(contrast @ lateness), float(np.sqrt(contrast @ covariance @ contrast))
-        relative[i] = value
+        relative[i], sigmas[i] = value, sigma
         late[i] = i not in reference and abs(value) > max(limit * sigma, _LEAST_S)
         said = _said(name, [names[k] for k in others], value, interval) if late[i] else None
         offsets[name] = CameraOffset(value * _MS, sigma * _MS, said)
-    return Synchrony(offsets, late, relative)
+    told = len(reference) > 1 or not late.any()
+    if not told:
+        late[able] = True
+        relative[reference] = 0.0
+        relative[able] -= relative[able].mean()
+        sigmas[able] = np.linalg.norm(relative)
+    return Synchrony(offsets, late, relative, sigmas, told)
 
 
 def _reference(able: list[int], lateness: Floats, covariance: Floats) -> list[int]:

@@ -44,13 +44,13 @@ def compute_jump(
     """
     everything, uncertain = jump, frozenset[str]()
     motion = smooth(jump, measurements, system)
-    first = raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
+    first = raw = solve_pulses(jump, measurements, system, motion.states, motion.removed, motion.late)
     troubles = [] if motion.message is None else [motion.message]
     told = told_names(raw.states)
     if (untold := untold_line(raw.states, told)) is not None:
         jump, uncertain = only_told(jump, told), untold_parts(told)
         motion = smooth(jump, measurements, system)
-        raw = solve_pulses(jump, measurements, system, motion.states, motion.removed)
+        raw = solve_pulses(jump, measurements, system, motion.states, motion.removed, motion.late)
         troubles = [untold] if not told or motion.message is None else [untold, motion.message]
     conditions = [
         {what: (before if what in uncertain else now)[what] for what in now}

@@ -24,6 +24,7 @@ class Points:
         seen: (n, m).
         by_hand: (n, m).
         shift: (n, m, 3) how much farther the jumper was when the camera saw it than at the instant of the result, m.
+        spread: (n, m, 3) standard deviation of the shift, along the way, m.
     """
 
     cameras: Sequence[PlacedCamera]
@@ -33,6 +34,7 @@ class Points:
     seen: Flags
     by_hand: Flags
     shift: Floats
+    spread: Floats
 
     def start(self, seen: Flags) -> Floats:
         """The points (n, 3) with the least square sum of distances from the rays."""
@@ -51,11 +53,13 @@ class Points:
         cameras, own = stacked(tuple(self.cameras), self.parameters)
         places = (state[:, None] + self.shift).reshape(-1, 3)
         v, by_point, by_own, before = cameras.in_turn(n).equations(places, self.xy.reshape(-1, 2))
+        by_point = by_point.reshape(n, m, 2, 3)
+        off = by_point @ self.spread[..., None]
         return Equations(
             v.reshape(n, m, 2),
-            by_point.reshape(n, m, 2, 3),
+            by_point,
             by_own.reshape(n, m, 2, by_own.shape[-1]) @ own,
-            self.covariance,
+            self.covariance + off * off.swapaxes(2, 3),
             before.reshape(n, m),
         )
 
@@ -85,16 +89,20 @@ class Points:
             seen=self.seen[rows],
             by_hand=self.by_hand[rows],
             shift=self.shift[rows],
+            spread=self.spread[rows],
         )
 
 
-def points_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Floats) -> Points:
+def points_of(
+    system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Floats | None = None, spread: Floats | None = None
+) -> Points:
     """All points of a jump: P1 to P4 of the first pulse, then of the next.
 
     Args:
         system: m oriented cameras; measurements of others are left out.
         pulses: of the jump.
         shift: (pulses, m, 3), see `Points.shift`.
+        spread: (pulses, m, 3), likewise; zero where they are left out.
     """
     cameras = tuple(system.cameras.values())
     n, m = len(pulses) * len(POINTS), len(cameras)
@@ -108,7 +116,9 @@ def points_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: 
                 i = p * len(POINTS) + POINTS.index(name)
                 xy[i, j], covariance[i, j], seen[i, j] = point.xy, point.covariance, True
                 by_hand[i, j] = point.source is Source.BY_HAND
-    return Points(cameras, len(system.covariance), xy, covariance, seen, by_hand, np.repeat(shift, len(POINTS), axis=0))
+    nothing = np.zeros((len(pulses), m, 3))
+    far = (np.repeat(nothing if each is None else each, len(POINTS), axis=0) for each in (shift, spread))
+    return Points(cameras, len(system.covariance), xy, covariance, seen, by_hand, *far)
 
 
 def rays(camera: PlacedCamera, xy: Floats) -> Floats:

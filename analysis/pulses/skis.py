@@ -35,6 +35,7 @@ class SkiLines:
         seen: (n, m).
         by_hand: (n, m).
         shift: (n, m, 3) how much farther the jumper was when the camera saw it than at the instant of the result, m.
+        spread: (n, m, 3) standard deviation of the shift, along the way, m.
     """
 
     cameras: Sequence[PlacedCamera]
@@ -46,6 +47,7 @@ class SkiLines:
     seen: Flags
     by_hand: Flags
     shift: Floats
+    spread: Floats
 
     def start(self, seen: Flags) -> Floats:
         """Lines that meet the planes through projection centres and image lines best (C.3)."""
@@ -81,11 +83,12 @@ class SkiLines:
         on_one, on_other = (across * one[:, None, None]).sum(axis=-1), (across * other[:, None, None]).sum(axis=-1)
         design = np.stack((on_one, on_other, lever * on_one, lever * on_other), axis=-1)
         gain, covariance = self._reduction(tangent)
+        off = gain @ (across @ self.spread[..., None])
         return Equations(
             (gain @ (normal * v).sum(axis=-1)[..., None])[..., 0],
             gain @ design,
             gain @ (normal[..., None, :] @ by_own)[..., 0, :] @ own,
-            covariance,
+            covariance + off * off.swapaxes(2, 3),
             np.asarray((before | (self.weight == 0)).all(axis=2)),
         )
 
@@ -138,6 +141,7 @@ class SkiLines:
             seen=self.seen[rows],
             by_hand=self.by_hand[rows],
             shift=self.shift[rows],
+            spread=self.spread[rows],
         )
 
     def interchanged(self, image: int) -> "SkiLines":
@@ -149,13 +153,16 @@ class SkiLines:
         return result
 
 
-def skis_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Floats) -> SkiLines:
+def skis_of(
+    system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Floats | None = None, spread: Floats | None = None
+) -> SkiLines:
     """All skis of a jump: right and left one of the first pulse, then of the next.
 
     Args:
         system: m oriented cameras; measurements of others are left out.
         pulses: of the jump.
         shift: (pulses, m, 3), see `SkiLines.shift`.
+        spread: (pulses, m, 3), likewise; zero where they are left out.
     """
     cameras = tuple(system.cameras.values())
     found = [
@@ -176,6 +183,7 @@ def skis_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Fl
         by_hand[i, j] = ski.source is Source.BY_HAND
     arrays, _ = stacked(cameras, len(system.covariance))
     ray = arrays.in_turn(n, k).rays(xy.reshape(-1, 2)).reshape(n, m, k, 3)
+    nothing = np.zeros((len(pulses), m, 3))
     return SkiLines(
         cameras,
         len(system.covariance),
@@ -185,7 +193,7 @@ def skis_of(system: CameraSystem, pulses: Sequence[PulseMeasurements], shift: Fl
         common,
         _long(xy, weight),
         by_hand,
-        np.repeat(shift, len(SIDES), axis=0),
+        *(np.repeat(nothing if each is None else each, len(SIDES), axis=0) for each in (shift, spread)),
     )
 
 

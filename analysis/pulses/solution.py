@@ -14,7 +14,7 @@ from analysis.pulses.scaling import scaled_to_fit
 from analysis.pulses.skis import skis_of
 from analysis.pulses.states import Solved, jumper_states
 from analysis.pulses.travel import velocities
-from analysis.result.model import JumperState, RayTest, SmoothedState
+from analysis.result.model import JumperState, Quantity, RayTest, SmoothedState
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from rig.arrays import Integers
 from rig.errors import BadInputError
@@ -48,6 +48,7 @@ def solve_pulses(
     system: CameraSystem,
     smoothed: Sequence[SmoothedState | None] = (),
     doubted: Collection[RayTest] = (),
+    late: Mapping[str, Quantity] | None = None,
 ) -> RawJump:
     """Intersect points and skis of each pulse, compute angles, height and speed, and test all rays.
 
@@ -58,6 +59,7 @@ def solve_pulses(
         smoothed: states of the pulses by the motion over time; points and skis that contradict them are given up if
             too few images control them. None at all: nothing is known of the motion.
         doubted: rays that contradict the motion.
+        late: by camera how much later than at the pulse it shows the jumper, s, of cameras that are not synchronous.
 
     Raises:
         BadInputError: images have another size than the camera was calibrated for.
@@ -68,12 +70,13 @@ def solve_pulses(
     if not pulses:
         return RawJump((), ())
     times = np.array([(pulse.time - pulses[0].time) * _NS for pulse in pulses])
-    late = np.array([measurements.late_s(camera.name) for camera in cameras])
-    shift = np.zeros((len(pulses), len(cameras), 3))
-    if np.abs(late).max() > _TOGETHER_S:
-        place = adjust(points_of(system, pulses, shift), system.covariance).state  # good enough for the velocity
-        shift = late[:, None] * velocities(place.reshape(-1, len(POINTS), 3), times)[:, None]
-    points, skis = points_of(system, pulses, shift), skis_of(system, pulses, shift)
+    lateness = np.array([_lateness(camera.name, measurements, late or {}) for camera in cameras])
+    shift = spread = None
+    if np.abs(lateness).max() > _TOGETHER_S:
+        place = adjust(points_of(system, pulses), system.covariance).state  # good enough for the velocity
+        velocity = velocities(place.reshape(-1, len(POINTS), 3), times)[:, None]
+        shift, spread = (lateness[:, i, None] * velocity for i in range(2))
+    points, skis = points_of(system, pulses, shift, spread), skis_of(system, pulses, shift, spread)
     other_names = [skis.interchanged(image) for image in range(len(cameras))]
     points, places, points_scale = scaled_to_fit(points, system.covariance)
     skis, lines, skis_scale = scaled_to_fit(skis, system.covariance, other_names)
@@ -97,6 +100,12 @@ def _conditions(solved: Solved) -> tuple[dict[str, Condition], ...]:
     skis = solved.skis.adjusted.condition.reshape(-1, len(SIDES))
     both = np.concatenate((points, skis), axis=1)
     return tuple(dict(zip((*POINTS, *SIDES), map(Condition, row), strict=True)) for row in both.tolist())
+
+
+def _lateness(camera: str, measurements: Measurements, late: Mapping[str, Quantity]) -> tuple[float, float]:
+    """How much later than the instant of the result a camera sees the jumper, and the standard deviation of that, s."""
+    known, offset = measurements.late_s(camera), late.get(camera)
+    return (known, 0.0) if offset is None else (known + offset.value, offset.sigma)
 
 
 def _expected_points(

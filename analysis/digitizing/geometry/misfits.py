@@ -70,7 +70,7 @@ def _tests(system: CameraSystem, marks: Sequence[PulseMarks]) -> Iterator[Worst]
     rays = {(now.pulse, thing): of for now in marks for thing, of in now.rays().items()}
     found = intersected(system, {f"{pulse} {thing}": of for (pulse, thing), of in rays.items()})
     yield from _notable(system, found.adjusted, list(rays))
-    skis = skis_of(system, [now.effective() for now in marks], np.zeros((len(marks), len(system.names), 3)))
+    skis = skis_of(system, [now.effective() for now in marks])
     names = {side: name for name, side in LINES.items()}
     keys = [(now.pulse, names[side]) for now in marks for side in SIDES]
     yield from _notable(system, adjust(skis, system.covariance), keys)

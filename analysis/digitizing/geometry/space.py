@@ -80,7 +80,7 @@ def intersected(system: CameraSystem, measured: Mapping[str, Mapping[str, Ray]])
         for j, camera in enumerate(cameras):
             if (ray := by_camera.get(camera.name)) is not None:
                 xy[i, j], covariance[i, j], seen[i, j] = ray.xy, ray.covariance, True
-    points = Points(cameras, len(system.covariance), xy, covariance, seen, seen, np.zeros((n, m, 3)))
+    points = Points(cameras, len(system.covariance), xy, covariance, seen, seen, *np.zeros((2, n, m, 3)))
     return PointsInSpace(tuple(measured), points, adjust(points, system.covariance))
 
 
@@ -184,7 +184,7 @@ class SkisInSpace:
 
 def intersected_skis(system: CameraSystem, pulse: PulseMeasurements) -> SkisInSpace:
     """Intersect the skis of a pulse."""
-    skis = skis_of(system, [pulse], np.zeros((1, len(system.names), 3)))
+    skis = skis_of(system, [pulse])
     adjusted = adjust(skis, system.covariance)
     lines = tuple(name for name in LINES if any(LINES[name] in image.skis for image in pulse.images.values()))
     return SkisInSpace(skis, adjusted, check_skis(skis, adjusted, system.covariance), _sides(system, pulse), lines)

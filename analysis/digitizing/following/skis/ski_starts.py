@@ -88,7 +88,7 @@ def ski_start(
         known: of the motion of bindings and other points, by name.
     """
     measured = effective_pulse(pulse, log.times[pulse], marks, None)
-    skis = skis_of(system, [measured], np.zeros((1, len(system.names), 3)))
+    skis = skis_of(system, [measured])
     lines = adjust(skis, system.covariance)
     bindings = intersected(system, {name: _rays(marks, name) for name in BINDINGS.values()})
     poses = Poses(np.zeros((SKIS, 3)), np.tile((1.0, 0.0, 0.0), (SKIS, 1)))

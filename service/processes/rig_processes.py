@@ -8,7 +8,6 @@ grabbers again. The owner decides what happens when the recorder dies.
 """
 
 import os
-import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
@@ -19,18 +18,16 @@ from rig.clocks import HostNs, host_now
 from rig.doctor_call import doctor_call
 from rig.errors import ProcessDiedError
 from rig.events import Event, Level
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
-from rig.settings.trigger import ActionTrigger, GpioTrigger, IidcBroadcastTrigger, TriggerBoxTrigger
-from rig.transport.analysis_messages import AnalysisConfig, AnalysisReport, AnalysisTold, JumpMeasured, Measuring
-from rig.transport.grabber_messages import GrabberConfig
+from rig.settings.trigger import ActionTrigger
+from rig.transport.analysis_messages import AnalysisTold, JumpMeasured, Measuring
 from rig.transport.message import Quit
-from rig.transport.process_table import BackOff, Child, ProcessSpec, ProcessTable
+from rig.transport.process_table import Child, ProcessTable
 from rig.transport.recorder_commands import (
     GrabberDied,
     PulsesFired,
     RecorderCommand,
-    RecorderConfig,
     RecorderOptions,
     TellActions,
     TellPulses,
@@ -46,21 +43,14 @@ from rig.transport.ring import CameraRing
 from rig.transport.trigger_messages import (
     CamerasSeen,
     LetPulses,
-    TriggerBoxConfig,
-    TriggerConfig,
-    TriggerReport,
     TriggerTold,
 )
 from service.processes.backends import check_backends
 from service.processes.memory import ring_slots
+from service.processes.restarts import Restarts
+from service.processes.rig_programs import ANALYSIS, RECORDER, TRIGGER, RigPrograms
 from service.processes.seen import Processes, Seen
-from service.processes.simulation import TRIGGER_PORT
 
-RECORDER: Final = "recorder"
-ANALYSIS: Final = "analysis"
-TRIGGER: Final = "trigger"
-#: Sources whose pulses a process of its own makes.
-_MADE_BY_A_PROCESS: Final = ActionTrigger | IidcBroadcastTrigger | TriggerBoxTrigger | GpioTrigger
 #: What the processes of a rig tell the service.
 RigReport = RecorderReport | JumpMeasured | Measuring
 #: Reports that are dealt with here.
@@ -91,33 +81,27 @@ class RigProcesses:
         environment: Mapping[str, str] | None = None,
     ) -> None:
         check_backends(rig)
-        self._rig, self._on_event = rig, on_event
-        self._options = recorder or RecorderOptions(directory=rig.recorder.directory)
-        self._environment = dict(environment or {})
+        options = recorder or RecorderOptions(directory=rig.recorder.directory)
+        self._programs = RigPrograms(rig, host_now() if epoch is None else epoch, options, dict(environment or {}))
+        self._on_event = on_event
         self._processes = ProcessTable()
         self._exit = ExitStack()
-        self._rings: list[CameraRing] = []
-        self._doorbell = -1
-        self._epoch = host_now() if epoch is None else epoch
-        self._names = [camera.name for camera in rig.cameras]
-        making = [TRIGGER] if isinstance(rig.trigger, _MADE_BY_A_PROCESS) else []
-        self._helpers = [*self._names, *making, *([] if rig.analysis is None else [ANALYSIS])]
-        self._back_offs = {name: BackOff() for name in self._helpers}
-        self._again: dict[Child, float] = {}
-        self._renewed: set[str] = set()
+        self._restarts = Restarts(self._programs.helpers)
         self._seen = Seen.begun(len(rig.cameras))
 
     def __enter__(self) -> Self:
+        rig = self._programs.rig
         with ExitStack() as stack:
-            self._doorbell = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
-            stack.callback(os.close, self._doorbell)
-            for camera in self._rig.cameras:
-                ring = CameraRing.create(camera.name, camera.frame_bytes, ring_slots(self._rig))
+            doorbell = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+            stack.callback(os.close, doorbell)
+            rings = []
+            for camera in rig.cameras:
+                ring = CameraRing.create(camera.name, camera.frame_bytes, ring_slots(rig))
                 stack.callback(ring.close)
-                self._rings.append(ring)
+                rings.append(ring.fd)
+            self._programs = replace(self._programs, rings=tuple(rings), doorbell=doorbell)
             stack.callback(self._processes.stop)
-            self._start_recorder()
-            for name in self._helpers:
+            for name in (RECORDER, *self._programs.helpers):
                 self._start(name)
             self._exit = stack.pop_all()
         return self
@@ -130,14 +114,13 @@ class RigProcesses:
     @property
     def pids(self) -> dict[str, int]:
         """Process ids by row of the process table."""
-        return {name: self._processes[name].pid for name in (*self._helpers, RECORDER)}
+        return {name: self._processes[name].pid for name in (*self._programs.helpers, RECORDER)}
 
     @property
     def seen(self) -> Seen:
         """All that is known of the processes now."""
-        restarts = {name: back_off.deaths for name, back_off in self._back_offs.items()}
         started = self._processes[RECORDER].started
-        return replace(self._seen, started=started, pids=self.pids, restarts=restarts)
+        return replace(self._seen, started=started, pids=self.pids, restarts=self._restarts.deaths)
 
     @property
     def _recorder_died(self) -> bool:
@@ -163,9 +146,9 @@ class RigProcesses:
             rig: the rig; only this camera's exposure and gain are others than before.
             name: of the camera.
         """
-        self._rig = rig
+        self._programs = replace(self._programs, rig=rig)
         for helper in (name, *([] if rig.analysis is None else [ANALYSIS])):
-            self._renewed.add(helper)
+            self._restarts.renew(helper)
             self._processes[helper].control.send(Quit())
 
     def let_pulses(self, pulses: int | None) -> None:
@@ -198,8 +181,8 @@ class RigProcesses:
                 case AnalysisTold() | TriggerTold() | RecorderEvent():
                     self._on_event(report.event)
                 case CameraChanged():
-                    self._on_event(report.event(self._names[report.camera]))
-                case RecorderHealth() if isinstance(self._rig.trigger, ActionTrigger):
+                    self._on_event(report.event(self._programs.cameras[report.camera]))
+                case RecorderHealth() if isinstance(self._programs.rig.trigger, ActionTrigger):
                     self._processes[TRIGGER].control.send(CamerasSeen.of(report.health))
         self._tend()
         return [report for report in reports if not isinstance(report, _FORWARDED)]
@@ -207,7 +190,7 @@ class RigProcesses:
     def restart_recorder(self) -> None:
         """Start a recorder in place of the dead one; it takes over cameras that are still streaming at once."""
         self._seen = replace(self._seen, processes=Processes.ALL)
-        self._start_recorder()
+        self._start(RECORDER)
 
     def _tend(self) -> None:
         """Start dead grabbers again, after a wait that grows; raise if the recorder died."""
@@ -221,88 +204,27 @@ class RigProcesses:
                 raise ProcessDiedError(phrase("why_recorder_ended", text, how=how, doctor=doctor_call()))
 
     def _tend_helper(self, child: Child) -> None:
-        name, now = child.spec.name, time.monotonic()
-        if name in self._renewed:
-            self._renewed.discard(name)
-            self._again.pop(child, None)
-            if name in self._names:
-                reason = phrase("why_other_settings", "it gets other settings, and is back at once")
-                self.tell(GrabberDied(camera=self._names.index(name), reason=reason))
-            self._start(name)
-        elif child not in self._again:
-            how = child.ending() or ""
-            if name not in self._names:
-                reason = phrase("why_process_ended", "process ended ({how})", how=how)
-            else:
-                reason = phrase("why_grabber_ended", "grabber process ended ({how})", how=how)
-            back_off = self._back_offs[name] = self._back_offs[name].died(now - child.started)
-            wait_s = back_off.wait_s
-            self._again[child] = now + wait_s
+        name, restart = child.spec.name, self._restarts.ended(child)
+        if restart.renewed:
+            self._camera_gone(name, phrase("why_other_settings", "it gets other settings, and is back at once"))
+        elif restart.wait_s is not None:
+            kind, text = (
+                ("why_grabber_ended", "grabber process ended ({how})")
+                if name in self._programs.cameras
+                else ("why_process_ended", "process ended ({how})")
+            )
+            reason = phrase(kind, text, how=child.ending() or "")
             text = "{why}; starting it again in {seconds:g} s"
-            said = phrase("event_process_again", text, why=reason, seconds=wait_s)
+            said = phrase("event_process_again", text, why=reason, seconds=restart.wait_s)
             self._on_event(Event.now(Level.ERROR, name, said))
-            if name in self._names:
-                self.tell(GrabberDied(camera=self._names.index(name), reason=reason))
-        elif now >= self._again[child]:
-            del self._again[child]
+            self._camera_gone(name, reason)
+        if restart.start:
             self._start(name)
+
+    def _camera_gone(self, name: str, reason: Phrase) -> None:
+        """The recorder learns of a grabber that ended; of another process it need not."""
+        if name in self._programs.cameras:
+            self.tell(GrabberDied(camera=self._programs.cameras.index(name), reason=reason))
 
     def _start(self, name: str) -> None:
-        """Start a grabber, by the name of its camera, or another helper."""
-        if name == ANALYSIS:
-            self._start_analysis()
-        elif name == TRIGGER:
-            self._start_trigger()
-        else:
-            self._start_grabber(self._names.index(name))
-
-    def _start_analysis(self) -> None:
-        config = AnalysisConfig(rig=self._rig, directory=self._options.directory)
-        self._processes.start(
-            ProcessSpec(ANALYSIS, "service.processes.programs.analysis", config, reports=AnalysisReport)
-        )
-
-    def _start_trigger(self) -> None:
-        trigger = self._rig.trigger
-        if isinstance(trigger, TriggerBoxTrigger):
-            config = TriggerBoxConfig(
-                rig=self._rig, port=self._environment.get(TRIGGER_PORT, trigger.port), still=self._seen.still
-            )
-            box = ProcessSpec(TRIGGER, "service.processes.programs.triggerbox", config, reports=TriggerReport)
-            self._processes.start(box)
-        else:
-            at_times = isinstance(trigger, GpioTrigger | IidcBroadcastTrigger)
-            program = "service.processes.programs.even_pulses" if at_times else "service.processes.programs.actions"
-            even = TriggerConfig(rig=self._rig, epoch=self._epoch, still=self._seen.still)
-            # As for grabbers: libdc1394 needs them to see the emulated bus.
-            more = self._environment if isinstance(trigger, IidcBroadcastTrigger) else {}
-            self._processes.start(ProcessSpec(TRIGGER, program, even, reports=TriggerReport, environment=more))
-
-    def _start_recorder(self) -> None:
-        fds, options = tuple(ring.fd for ring in self._rings), self._options
-        config = RecorderConfig(rig=self._rig, rings=fds, doorbell=self._doorbell, options=options, epoch=self._epoch)
-        preview = () if options.preview is None else (options.preview,)
-        self._processes.start(
-            ProcessSpec(
-                RECORDER,
-                "service.processes.programs.recorder",
-                config,
-                inherit=(*fds, self._doorbell, *preview),
-                reports=RecorderReport,
-            )
-        )
-
-    def _start_grabber(self, index: int) -> None:
-        ring = self._rings[index].fd
-        config = GrabberConfig(rig=self._rig, camera=index, ring=ring, doorbell=self._doorbell, epoch=self._epoch)
-        # Only libdc1394 needs variables, to see the emulated bus.
-        more = self._environment if self._rig.cameras[index].backend == "iidc" else {}
-        self._processes.start(
-            ProcessSpec(
-                self._names[index],
-                "service.processes.programs.grabber",
-                config,
-                inherit=(ring, self._doorbell),
-                environment=more,
-            )
-        )
+        self._processes.start(self._programs.program(name, still=self._seen.still))

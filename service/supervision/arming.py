@@ -10,7 +10,7 @@ from rig.events import Level
 from rig.phrase import phrase
 from rig.settings.model import RigSettings
 from rig.settings.trigger import ExternalTrigger
-from service.processes.rig_processes import RECORDER
+from service.processes.rig_programs import RECORDER
 from service.processes.seen import Processes, Seen
 from service.status.forbidden import FORBIDDEN
 from service.status.statements import no_camera, too_few_cameras, wrong_rate

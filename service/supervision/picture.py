@@ -25,7 +25,7 @@ from rig.api.status import (
     Status,
 )
 from rig.health import Health, PulsesMade
-from service.processes.rig_processes import RECORDER
+from service.processes.rig_programs import RECORDER
 from service.processes.seen import CameraPresence
 from service.recordings.storage import room_for
 from service.status.statements import about_camera, about_state, camera_state, pairing_alarm, process_restarted

@@ -15,7 +15,7 @@ from rig.transport.recorder_reports import RecorderHealth
 from service.alarms.keeper import AlarmKeeper
 from service.alarms.unrecorded import Unrecorded
 from service.jumpers.book import JumperBook
-from service.processes.rig_processes import ANALYSIS, TRIGGER
+from service.processes.rig_programs import ANALYSIS, TRIGGER
 from service.processes.seen import Processes
 from service.recordings import live_results
 from service.status.event_hub import EventHub

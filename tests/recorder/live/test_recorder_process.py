@@ -36,7 +36,8 @@ from rig.transport.recorder_reports import (
     RecordingProgress,
     RecordingStarted,
 )
-from service.processes.rig_processes import RECORDER, RigProcesses, RigReport
+from service.processes.rig_processes import RigProcesses, RigReport
+from service.processes.rig_programs import RECORDER
 from service.processes.simulation import simulated_hill
 from tests.capture.rigs import make_rig
 from tests.recorder.logs import jumper_state

@@ -20,7 +20,8 @@ from rig.events import Event, Level
 from rig.phrase import plain
 from rig.transport.recorder_commands import RecorderOptions, StartRecording, StopRecording
 from rig.transport.recorder_reports import RecordingFinished
-from service.processes.rig_processes import RECORDER, RigProcesses
+from service.processes.rig_processes import RigProcesses
+from service.processes.rig_programs import RECORDER
 from tests.capture.rigs import make_rig
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable

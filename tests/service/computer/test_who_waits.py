@@ -16,7 +16,8 @@ from rig.events import Event, Level
 from rig.phrase import plain
 from rig.transport.recorder_commands import RecorderOptions, StartRecording, StopRecording, TellEvent
 from rig.transport.recorder_reports import RecordingFinished, RecordingStarted
-from service.processes.rig_processes import RECORDER, RigProcesses
+from service.processes.rig_processes import RigProcesses
+from service.processes.rig_programs import RECORDER
 from tests.capture.rigs import make_rig, write_rig
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable

@@ -40,7 +40,8 @@ def told_names(states: Sequence[JumperState]) -> frozenset[str]:
       several pulses the other one would hardly be there. A hip in the crouch on the table may as well be a helmet, in
       flight a helmet is farther from the bindings; and never is a hip where a helmet is then.
 
-    Bindings of which one lies ahead of the other along the skis are not told: one of them is something else.
+    Bindings of which one lies ahead of the other along the skis are not told: one of them is something else. Nor is a
+    binding that lies, as seen from helmet or hip, where the other one is expected: of a single one both may be said.
     """
     points = [point for state in states for point in state.points.values() if point is not None]
     if any(point.status is Status.BY_HAND for point in points):
@@ -58,6 +59,7 @@ def told_names(states: Sequence[JumperState]) -> frozenset[str]:
         told.update(POINTS)
     if _ahead_m(states) > _AHEAD_M:
         told.difference_update(p for p, _ in _BINDINGS)
+    told.difference_update([p for p, _ in _BINDINGS if p in told and body.looks_like_the_other_side(p)])
     if not told.issuperset(_BODY) and not body.contradicts(_BODY[0], _BODY[1:]):
         bindings = told.intersection(p for p, _ in _BINDINGS)
         for name, other in (_BODY, _BODY[::-1]):
@@ -188,6 +190,13 @@ class _Body:
         ratios = self._squares(pair, second) - self._squares(pair) + more
         telling = len(ratios) >= _FEWEST and float(np.sort(ratios)[-_FEWEST]) >= USUAL
         return bool(telling and np.median(ratios) > 0.0)
+
+    def looks_like_the_other_side(self, binding: str) -> bool:
+        """Whether a binding lies to helmet or hip as the other binding does, in most of several pulses."""
+        other = next(name for name, _ in _BINDINGS if name != binding)
+        pairs = [(name, binding) for name in _BODY]
+        found = [self._squares(pair, other) - self._squares(pair) for pair in pairs]
+        return any(len(more) >= _FEWEST and float(np.median(more)) < 0.0 for more in found)
 
     def contradicts(self, name: str, others: Collection[str]) -> bool:
         """Whether a point does not look like what it is named beside some others."""

@@ -97,6 +97,21 @@ def test_bindings_of_which_one_lies_ahead_of_the_other_are_not_told(ahead_m: flo
     assert told_names([moved(state) for state in states]) == set(told.split())
 
 
+def test_a_single_binding_on_the_wrong_side_is_not_told() -> None:
+    """Only one binding and its ski are ever seen, and named as those of the other side."""
+
+    def single(right: str) -> frozenset[str]:
+        def seen(state: JumperState) -> JumperState:
+            points = {"P1": state.points["P1"], "P2": None, "P3": state.points[right], "P4": None}
+            side = "right" if right == "P3" else "left"
+            return replace(state, points=points, skis={"right": state.skis[side], "left": None})
+
+        return told_names([seen(pulse.raw) for pulse in _whole().pulses])
+
+    assert single("P3") == {"P1", "P3"}
+    assert "P3" not in single("P4")
+
+
 @cache
 def _measured() -> Measurements:
     return simulated_measurements(true_jump(3), true_cameras(), np.random.default_rng(3))

@@ -19,6 +19,7 @@ from tests.support.waiting import wait_until
 _COMMAND = (sys.executable, "-m", "svev", "serve")
 #: The machine may be busy: what is waited for takes a second or two on a quiet one.
 PATIENCE_S = 60.0
+_ENDS_S = 20.0
 
 
 class Serving:
@@ -199,11 +200,21 @@ def serving(
         yield service
         process.send_signal(signal.SIGTERM)
         assert process.wait(PATIENCE_S) == ends_with, log.read_text()
+    except BaseException:
+        _end(process)
+        raise
     finally:
         service.close()
-        if process.poll() is None:
-            process.kill()
-            process.wait(10)
+
+
+def _end(process: Process) -> None:
+    """End a service after a failure; told to, it ends its cameras and grabbers before it is gone."""
+    process.send_signal(signal.SIGTERM)
+    try:
+        process.wait(_ENDS_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait(_ENDS_S)
 
 
 def _answers(service: Serving) -> bool:

@@ -7,6 +7,7 @@ import reprlib
 import tomllib
 import unicodedata
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -256,7 +257,7 @@ def _walk(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[list
         stands. Where a key of a table decides about its others, pydantic puts the key's value into the location; it is
         left out here.
     """
-    schema = model.model_json_schema()
+    schema = _schema(model)
     node: dict[str, Any] = schema
     beside = node
     shown: list[str] = []
@@ -270,6 +271,12 @@ def _walk(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[list
         inside = node.get("items") if isinstance(part, int) else _value_of(node, part)
         node = _referred(schema, inside if isinstance(inside, dict) else {})
     return shown, sorted(beside.get("properties", {}))
+
+
+@cache
+def _schema(model: type[BaseModel]) -> dict[str, Any]:
+    """The schema of a model; not to be changed."""
+    return model.model_json_schema()
 
 
 def _referred(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:

@@ -144,6 +144,26 @@ def test_it(camera):
     assert re.search(r"the test session left behind.*\n.*process \d+ still runs", _pytest(tmp_path, source))
 
 
+def test_a_launcher_in_place_of_one_that_is_gone_is_no_leak(tmp_path: Path) -> None:
+    source = """
+import os, signal
+from rig.transport.launcher import launcher
+
+def test_another():
+    gone = launcher()
+    os.kill(gone.pid, signal.SIGKILL)
+    while gone.runs:
+        pass
+    assert launcher().pid != gone.pid
+
+def test_the_next_one():
+    assert launcher().runs
+"""
+    report = _pytest(tmp_path, source)
+    assert "2 passed" in report, report
+    assert "left behind" not in report
+
+
 def test_hardware_tests_run_only_when_asked_for(tmp_path: Path) -> None:
     source = "import pytest\n\n@pytest.mark.hardware\ndef test_camera(): pass\n"
     assert "needs real cameras; run with --hardware" in _pytest(tmp_path, source)

@@ -146,18 +146,25 @@ def run_token(request: pytest.FixtureRequest) -> Iterator[str]:
         launcher()
     before = Snapshot.take(token)
     yield token
+    end_launcher()
     grace_s: float = request.config.getoption("--leak-grace")
     whole = not request.session.testsfailed
     _complain("the test session", await_nothing_left(before, token, grace_s, _SPARE_EVENTS_SESSION, all_kinds=whole))
-    end_launcher()
     del os.environ[processes.TOKEN_VARIABLE]
 
 
 @pytest.fixture(autouse=True)
 def _nothing_left_behind(request: pytest.FixtureRequest, run_token: str) -> Iterator[None]:
-    """After every test: no process, thread, socket, file or shared memory more than before it."""
+    """After every test: no process, thread, socket, file or shared memory more than before it.
+
+    The launcher is no test's own. On a crowded machine it may answer so late that a test starts another one.
+    """
+    shared = launcher().pid
+    processes.share(shared)
     before = Snapshot.take(run_token)
     yield
+    if launcher().pid != shared:
+        end_launcher()  # the next test begins with one
     grace_s: float = request.config.getoption("--leak-grace")
     whole = not request.node.stash.get(_failed, False)
     _complain(request.node.name, await_nothing_left(before, run_token, grace_s, _SPARE_EVENTS_TEST, all_kinds=whole))

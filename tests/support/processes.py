@@ -61,6 +61,11 @@ def shared_from_now_on(token: str) -> Iterator[None]:
     _shared.update(process.pid for process in own_processes(token) - before)
 
 
+def share(pid: int) -> None:
+    """Count a process with its children as nobody's until it ends: it serves many tests."""
+    _shared.add(pid)
+
+
 def own_processes(token: str) -> frozenset[Process]:
     """All processes below this one and all that carry `token` in their environment, but for those that tests share."""
     everyone = all_processes(token)

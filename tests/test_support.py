@@ -170,6 +170,11 @@ def test_hardware_tests_run_only_when_asked_for(tmp_path: Path) -> None:
     assert "1 passed" in _pytest(tmp_path, source, "--hardware")
 
 
+def test_one_that_is_to_run_when_the_others_are_done_is_long(tmp_path: Path) -> None:
+    source = "import pytest\n\n@pytest.mark.alone\ndef test_waiting(): pass\n"
+    assert "test_waiting is marked alone but not long: mark it long as well" in _pytest(tmp_path, source)
+
+
 def test_those_that_may_take_longest_begin_first(tmp_path: Path) -> None:
     source = """
 import pytest

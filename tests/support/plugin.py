@@ -42,7 +42,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Those that may take longest begin first; without --hardware those that need real cameras are skipped."""
+    """Those that may take longest begin first; without --hardware those that need real cameras are skipped.
+
+    Raises:
+        UsageError: one marked `alone` is not marked `long`: `make test` would run it beside the others.
+    """
     usual_s = float(config.getini("timeout") or 0)
 
     def most_s(item: pytest.Item) -> float:
@@ -51,6 +55,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     # Otherwise one that takes minutes begins last, and the other workers have nothing left to do.
     items.sort(key=most_s, reverse=True)
+    for item in items:
+        if item.get_closest_marker("alone") and not item.get_closest_marker("long"):
+            raise pytest.UsageError(f"{item.nodeid} is marked alone but not long: mark it long as well")
     if config.getoption("--hardware"):
         return
     for item in items:

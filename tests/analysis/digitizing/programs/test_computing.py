@@ -45,6 +45,7 @@ def test_a_program_that_was_killed_is_told(jump: HillLog, desk: Desk) -> None:
     assert [path.name for path in desk.files.folder.iterdir()] == ["Anna.jsonl"]
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.timeout(3 * PATIENCE_S)
 def test_curves_follow_the_newest_marks(jump: HillLog, desk: Desk) -> None:
@@ -76,6 +77,7 @@ def test_curves_follow_the_newest_marks(jump: HillLog, desk: Desk) -> None:
     assert desk.programs.curves("Anna") == newest, "the same marks are not computed from again"
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.timeout(2 * PATIENCE_S)
 def test_curves_that_were_not_computed_are_told_and_asked_for_again_with_the_next_mark(

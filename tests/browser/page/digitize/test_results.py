@@ -58,6 +58,7 @@ def test_balls_that_were_clicked_orient_the_cameras(desk_by_survey: Desk, open_p
     expect(page.locator("#orient-clicked")).to_be_enabled()
 
 
+@pytest.mark.long
 @pytest.mark.alone
 @pytest.mark.timeout(400)
 def test_curves_follow_while_one_measures_and_a_click_on_one_goes_to_its_pulse(desk: Desk, open_page: Open) -> None:

@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench corpus test test-long check style wheel lowest bundle install rollback uninstall lock client-tool docs clean setup system
+.PHONY: help demo run bench corpus test test-long check style wheel lowest bundle install rollback uninstall lock tools client-tool docs clean setup system
 
 # Some environments forbid Python to keep what it compiled: then each of the thousands of processes of the tests, and each
 # call of pytest, would compile the program anew.
@@ -51,7 +51,7 @@ test-long: setup $(NPM) ## the tests that take long by nature: soak, every fault
 
 check: style test ## format, lint, types, layers, tests; CI tries the wheel and runs the long tests as well
 
-# `nice`, since with -j2 it runs beside the tests, whose simulated cameras keep time.
+# `nice`, since in CI it runs beside the tests, whose simulated cameras keep time.
 style: setup
 	@$(BIN)/ruff format --check --quiet . || { echo "format: run .venv/bin/ruff format ." >&2; exit 1; }
 	@$(BIN)/ruff check --quiet .
@@ -83,7 +83,9 @@ lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
 	@build/uv/bin/uv pip compile .ci/docs/requirements.in --python-version 3.11 --quiet --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --output-file .ci/docs/requirements.lock $(ARGS)
 
-client-tool: ## for the test that makes a client of the REST API: openapi-python-client, in an environment of its own
+tools: setup $(NPM) $(DOCS) client-tool ## all that CI fetches from the network, best at the same time (-j4)
+
+client-tool: system ## for the test that makes a client of the REST API: openapi-python-client, in an environment of its own
 	@test -x build/client-tool/bin/openapi-python-client || { /usr/bin/python3 -m venv build/client-tool && \
 	  build/client-tool/bin/pip install -qq openapi-python-client; }
 
@@ -119,7 +121,7 @@ $(SVEV): pyproject.toml $(LOCKED) | system
 	@touch $@
 
 # In an environment of its own: a site generator is no part of the program.
-$(DOCS): .ci/docs/requirements.lock
+$(DOCS): .ci/docs/requirements.lock | system
 	@echo "installing the site generator"
 	@/usr/bin/python3 -m venv --clear build/docs/env
 	@build/docs/env/bin/pip --disable-pip-version-check --no-input install -qq --require-hashes -r $<

@@ -17,6 +17,7 @@ from simrig.world.scenario import load_scenario
 from tests.simrig.gige.conftest import TRAINING, MakeCamera
 from tests.simrig.gige.raw_client import GvcpClient
 from tests.simrig.gige.receiver import Received, Receiver
+from tests.support.waiting import wait_until
 
 
 def without_stamp(image: np.ndarray) -> np.ndarray:
@@ -35,9 +36,10 @@ def test_every_pulse_gives_one_frame_with_its_own_time(make_camera: MakeCamera, 
     assert [frame.device_ns for frame in frames] == [
         simulated.clock.at_pulse(simulated.train.time(frame.pulse), frame.pulse) for frame in frames
     ]
+    pulses = {frame.pulse for frame in frames}
+    wait_until(lambda: set(simulated.camera.statistics().last_packets) >= pulses, "it is noted when they were sent")
     statistics = simulated.camera.statistics()
     assert statistics.overruns == statistics.missed == 0
-    assert set(statistics.last_packets) >= {frame.pulse for frame in frames}
     for pulse, sent in statistics.last_packets.items():
         assert sent >= simulated.train.time(pulse) + 1_000_000, "no packet before the end of the exposure"
 

@@ -21,7 +21,6 @@ from rig.arrays import Flags, Floats, Integers
 
 UNKNOWNS: Final = 10
 _TIGHT, _HALF_SIGMAS, _HALF_CONTRAST = 2.0, 3.0, 0.06  # the same in px; residuals that count half
-_COUNTED = 0.6  # share of the pixels that must count
 MARGIN: Final = 2.6  #: px beyond the disc that are fitted: a lens blurs a border over two
 FARTHEST: Final = 24.0  #: px; no pixel farther away is fitted
 _GROUPS = 5.0, 6.6, 10.5  # px; spots that are fitted up to a distance between these are fitted together

@@ -1,16 +1,19 @@
 """From pictures of targets to calibrated cameras (paper, step 1): one bundle adjustment of all cameras' pictures."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from analysis.targets.bending import unbent
 from analysis.targets.mixing import adjusted_or_none, of_one_lens
 from analysis.targets.network_of import MeasuredDistance, Picture, network_of
 from analysis.targets.pattern import Layout, target_of
 from analysis.targets.verdict import CameraVerdict, print_notes, require_poses, verdicts
 from photogrammetry.adjustment.equations.unknowns import State, state_of
+from photogrammetry.adjustment.gross_errors.blunders import BlunderKind, Removed
 from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
 from photogrammetry.network.diagnosis import NotConvergedError
 from photogrammetry.network.model import Network
@@ -63,6 +66,7 @@ def calibrate_pictures(
     network, contradicting = of_one_lens(network)
     pictures = _used(pictures, network)
     network, moved = _without_moved(network)
+    network = unbent(network, pictures)
     calibration = calibrate(network)
     a = calibration.outcome.adjustment
     return PictureCalibration(
@@ -70,7 +74,14 @@ def calibrate_pictures(
         calibration,
         pictures,
         tuple(verdicts(a, pictures)),
-        (*notes, *odd, *contradicting, *moved, *print_notes(a, layout, scaled=bool(distances))),
+        (
+            *notes,
+            *odd,
+            *contradicting,
+            *moved,
+            *_hidden(calibration.outcome.removed),
+            *print_notes(a, layout, scaled=bool(distances)),
+        ),
     )
 
 
@@ -111,13 +122,11 @@ def _without_moved(network: Network) -> tuple[Network, list[str]]:
     notes: list[str] = []
     while True:
         a = adjust_once(network, state_of(network))
-        targets = np.array([target_of(network.points[i].name) for i in a.problem.point])
-        v = np.square(a.image_residuals() / a.problem.sigma).sum(axis=1)
-        names = list(dict.fromkeys(targets.tolist()))
-        sizes = {name: float(np.sqrt(v[targets == name].mean())) for name in names}
-        worst = max(names, key=lambda name: sizes[name])
-        others = float(np.sqrt(v[targets != worst].mean())) if len(names) > _TARGETS_LEFT else np.inf
-        if sizes[worst] < _TIMES * others or worst == "board":
+        sizes = _residuals_by_target(network, a)
+        worst = max(sizes, key=lambda name: sizes[name])
+        others = [size**2 for name, size in sizes.items() if name != worst]
+        few = len(sizes) <= _TARGETS_LEFT
+        if few or worst == "board" or sizes[worst] < _TIMES * float(np.sqrt(np.mean(others))):
             return _at(network, a), notes
         stays = np.array([target_of(point.name) != worst for point in network.points])
         network = only_points(network, stays)
@@ -125,6 +134,36 @@ def _without_moved(network: Network) -> tuple[Network, list[str]]:
             f"target {worst[1:]} is left out: it moved on the frame between the pictures; fix all targets to one rigid "
             "thing"
         )
+
+
+def _hidden(removed: Sequence[Removed]) -> list[str]:
+    """A line for each target of which single corners were taken out in single pictures."""
+    of_target = defaultdict[str, list[str]](list)
+    for gone in removed:
+        if gone.blunder.suspect.kind is BlunderKind.IMAGE:
+            o, k = gone.network.observations, gone.blunder.suspect.index
+            name = gone.network.points[o.point[k]].name
+            of_target[target_of(name)].append(f"{name} in {gone.network.images[o.image[k]].name}")
+    return [
+        f"{'the board' if target == 'board' else f'target {target[1:]}'}: what does not fit its other pictures is left "
+        f"out: {', '.join(corners)}; take care that nothing hides a part of it, such as the edge of another target"
+        for target, corners in of_target.items()
+    ]
+
+
+def _residuals_by_target(network: Network, a: Adjustment) -> dict[str, float]:
+    """The residuals of each target over their sigmas: rms over pictures of what half of its corners there exceed.
+
+    A target that moved is off with all its corners; one that another target hides in part is not.
+    """
+    v = np.square(a.image_residuals() / a.problem.sigma).sum(axis=1)
+    seen = defaultdict[tuple[str, int], list[float]](list)
+    for point, image, size in zip(a.problem.point.tolist(), a.problem.image.tolist(), v.tolist(), strict=True):
+        seen[target_of(network.points[point].name), image].append(size)
+    of_target = defaultdict[str, list[float]](list)
+    for (target, _), sizes in seen.items():
+        of_target[target].append(sorted(sizes)[(len(sizes) - 1) // 2])
+    return {target: float(np.sqrt(np.mean(sizes))) for target, sizes in of_target.items()}
 
 
 def _at(network: Network, a: Adjustment) -> Network:

@@ -43,7 +43,7 @@ def measurable(square: Floats, size: tuple[int, int]) -> bool:
         square.astype(np.float32)
     ):
         return False
-    axes = np.linalg.svd(_shapes(_homography(square)), compute_uv=False)
+    axes = np.linalg.svd(_slopes(_homography(square)), compute_uv=False)
     return bool(axes.min() > _SMALLEST and _WINDOW * axes.max() < min(size) / 2.0)
 
 
@@ -58,18 +58,18 @@ def measure_circles(grey: NDArray[np.float32], squares: Floats) -> Measured:
         4 n centres, target by target.
     """
     start = squares.reshape(-1, 2)
-    shape = np.concatenate([_shapes(_homography(square)) for square in squares])
-    need = np.ceil(_WINDOW * np.linalg.norm(shape, 2, axis=(1, 2)) / _STEP).astype(np.intp) * _STEP
+    slope = np.concatenate([_slopes(_homography(square)) for square in squares])
+    need = np.ceil(_WINDOW * np.linalg.norm(slope, 2, axis=(1, 2)) / _STEP).astype(np.intp) * _STEP
     groups = [np.flatnonzero(need == radius) for radius in np.unique(need)]
-    parts = [_fitted_discs(grey, start[some], shape[some], int(need[some[0]])) for some in groups]
+    parts = [_fitted_discs(grey, start[some], slope[some], int(need[some[0]])) for some in groups]
     back = np.argsort(np.concatenate(groups))
-    xy, cofactor, noise, contrast, blur, good = (
+    xy, cofactor, noise, contrast, blur, reach, good = (
         np.concatenate([getattr(part, name) for part in parts])[back] for name in Measured.__slots__
     )
     whole = good.reshape(-1, 4).all(axis=1)  # the offset of fewer than four is not known
     for k in np.flatnonzero(whole).tolist():
         xy[4 * k : 4 * k + 4] = projected_centres(xy[4 * k : 4 * k + 4])
-    return Measured(xy, cofactor, noise, contrast, blur, np.repeat(whole, 4))
+    return Measured(xy, cofactor, noise, contrast, blur, reach, np.repeat(whole, 4))
 
 
 def projected_centres(ellipses: Floats) -> Floats:
@@ -98,18 +98,16 @@ def _homography(square: Floats) -> Floats:
     return np.asarray(np.array([[1.0, 0.0, middle[0]], [0.0, 1.0, middle[1]], [0.0, 0.0, 1.0]]) @ h, float)
 
 
-def _shapes(h: Floats) -> Floats:
-    """(4, 2, 2) symmetric matrices whose columns span the ellipses of a target's discs, px."""
-    shapes = []
+def _slopes(h: Floats) -> Floats:
+    """(4, 2, 2) columns that span the ellipses of a target's discs, px: radii to its right and downwards."""
+    slopes = []
     for centre in CORNERS:
         x, y, w = h @ np.append(centre, 1.0)
-        slope = DISC * (h[:2, :2] - np.outer((x / w, y / w), h[2, :2])) / w
-        values, vectors = np.linalg.eigh(slope @ slope.T)
-        shapes.append(vectors @ np.diag(np.sqrt(values)) @ vectors.T)
-    return np.array(shapes)
+        slopes.append(DISC * (h[:2, :2] - np.outer((x / w, y / w), h[2, :2])) / w)
+    return np.array(slopes)
 
 
-def _fitted_discs(grey: NDArray[np.float32], start: Floats, shape: Floats, radius: int) -> Measured:
+def _fitted_discs(grey: NDArray[np.float32], start: Floats, slope: Floats, radius: int) -> Measured:
     """Fit discs whose windows are of one size."""
     side = np.arange(-radius, radius + 1)
     dx, dy = (part.ravel().astype(float) for part in np.meshgrid(side, side))
@@ -120,7 +118,8 @@ def _fitted_discs(grey: NDArray[np.float32], start: Floats, shape: Floats, radiu
     row, column = (np.clip(middle[:, k], 0, grey.shape[1 - k] - 1) + radius for k in (1, 0))
     values = wide[row[:, None] + dy.astype(np.intp), column[:, None] + dx.astype(np.intp)].astype(float)
 
-    inverse = np.linalg.inv(shape)
+    squares, axes = np.linalg.eigh(slope @ np.swapaxes(slope, 1, 2))
+    inverse = (axes / np.sqrt(squares)[:, None]) @ np.swapaxes(axes, 1, 2)  # symmetric, as M is
     apart = np.stack((dx, dy), axis=-1) - (start - middle)[:, None]
     inside = np.linalg.norm(apart @ inverse, axis=2) < _WINDOW
     low, high = np.nanpercentile(np.where(inside, values, np.nan), (10, 90), axis=1)
@@ -136,6 +135,7 @@ def _fitted_discs(grey: NDArray[np.float32], start: Floats, shape: Floats, radiu
         np.sqrt(fit.cost / np.maximum(inside.sum(axis=1) - unknowns.shape[1], 1)),
         fit.unknowns[:, 5],
         np.exp(fit.unknowns[:, -1]),
+        slope,
         fits & fit.settled & (moved < _MOVED),
     )
 

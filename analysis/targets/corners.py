@@ -57,6 +57,7 @@ def measure_corners(grey: NDArray[np.float32], start: Floats, edges: Floats, rad
         np.sqrt(fit.cost / (len(dx) - unknowns.shape[1])),
         fit.unknowns[:, 4],
         np.exp(fit.unknowns[:, -1]),
+        radius * np.swapaxes(edges, 1, 2),
         fits & fit.settled & (moved < radius / 2.0),
     )
 

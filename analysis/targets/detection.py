@@ -23,16 +23,23 @@ _APART: Final = 0.35
 #: A corner is none if the edges explain so little of the contrast, or its place is that uncertain.
 _MISFIT: Final = 0.2
 _UNSURE: Final = 0.25  # px
+#: Nor if its window fits so many times worse than half of them: something else is in it, such as another target's edge.
+_STRANGE: Final = 2.5
 
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """A measured corner, or centre of a circle: place (px, pixel frame) and sigmas (px)."""
+    """A measured corner, or centre of a disc: place (px, pixel frame) and sigmas (px), and how far it was fitted.
+
+    Attributes:
+        reach: two columns, px, pixel frame, given row by row: along both edges, or spanning the disc's ellipse.
+    """
 
     x: float
     y: float
     sigma_x: float
     sigma_y: float
+    reach: tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,15 +166,21 @@ def _measured(
         names += [str(corner) for code in circles for corner in layout.corners(code)]
     if not names:
         return {}, np.nan
-    xy, cofactor, noise, contrast, blur, good = (
+    xy, cofactor, noise, contrast, blur, reach, good = (
         np.concatenate([getattr(fit, part) for fit in fits])
-        for part in ("xy", "cofactor", "noise", "contrast", "blur", "good")
+        for part in ("xy", "cofactor", "noise", "contrast", "blur", "reach", "good")
     )
     good &= (contrast > 0.0) & (noise < _MISFIT * np.abs(contrast))
     if not good.any():
         return {}, np.nan
     # the noise of one window is known poorly; that of all windows of a picture well
-    sigma = np.sqrt(cofactor) * float(np.median(noise[good]))
-    good &= sigma.max(axis=1) < _UNSURE
-    corners = {name: Corner(*map(float, (*xy[i], *sigma[i]))) for i, name in enumerate(names) if good[i]}
+    usual = float(np.median(noise[good]))
+    sigma = np.sqrt(cofactor) * usual
+    good &= (sigma.max(axis=1) < _UNSURE) & (noise < _STRANGE * usual)
+    discs = good[len(good) - len(CORNERS) * len(circles) :].reshape(-1, len(CORNERS))
+    discs &= discs.all(axis=1, keepdims=True)  # all of a target gave the offset of each
+    corners = {}
+    for i in np.flatnonzero(good).tolist():
+        (a, b), (c, d) = reach[i].tolist()
+        corners[names[i]] = Corner(*map(float, (*xy[i], *sigma[i])), ((a, b), (c, d)))
     return corners, float(np.median(blur[good])) if good.any() else np.nan

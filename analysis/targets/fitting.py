@@ -24,6 +24,8 @@ class Measured:
         noise: (n,) rms of the grey values' residuals.
         contrast: (n,) half the difference of white and black, positive for the pattern that was looked for.
         blur: (n,) width s (px).
+        reach: (n, 2, 2) px, pixel frame, how far the pattern was fitted; columns: along both edges of a corner, or
+            spanning the ellipse of a disc.
         good: (n,) whether the fit converged within its window.
     """
 
@@ -32,6 +34,7 @@ class Measured:
     noise: Floats
     contrast: Floats
     blur: Floats
+    reach: Floats
     good: Flags
 
 

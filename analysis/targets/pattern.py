@@ -102,6 +102,11 @@ def target_of(name: str) -> str:
     return "board" if name.startswith("B") else name[:-1]
 
 
+def has_circles(name: str) -> bool:
+    """Whether the corner of this name is the centre of a disc."""
+    return name.startswith("T") and int(name[1:-1]) >= FIRST_CIRCLES
+
+
 def marker(code: int) -> NDArray[np.bool_]:
     """(7, 7) the fields of a marker, True where black."""
     dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARY)

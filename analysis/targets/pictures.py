@@ -59,7 +59,7 @@ def read_pictures(
         raise BadInputError(f"{', '.join(map(str, paths))}: no pictures in it{strange}{remedy}")
     _require_one_size(seen)
     _require_own_names(seen)
-    seen = _without_doubled(seen, layout, notes)
+    seen = _without_doubled(_without_copies(seen, notes), layout, notes)
     used = [picture for picture in seen if len(picture.sight.corners) >= FEWEST_CORNERS]
     notes += [f"{picture.name} is left out: {_why(picture.sight)}" for picture in seen if picture not in used]
     if not used:
@@ -177,6 +177,18 @@ def _require_own_names(pictures: Sequence[Picture]) -> None:
     names = [picture.name for picture in pictures]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise BadInputError(f"{twice[0]} is named twice; name each picture once, and call folders by their cameras")
+
+
+def _without_copies(pictures: Sequence[Picture], notes: list[str]) -> list[Picture]:
+    """The pictures, each once: a copy would count as another measurement."""
+    kept: list[Picture] = []
+    for picture in pictures:
+        same = (other for other in kept if picture.sight.corners and other.sight.corners == picture.sight.corners)
+        if (other := next(same, None)) is None:
+            kept.append(picture)
+        else:
+            notes.append(f"{picture.name} is left out: it is a copy of {other.name}")
+    return kept
 
 
 def _without_doubled(pictures: Sequence[Picture], layout: Layout, notes: list[str]) -> list[Picture]:

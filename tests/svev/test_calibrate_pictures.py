@@ -180,17 +180,18 @@ def test_what_no_calibration_comes_of_is_refused_in_one_line(
     assert "T106a and T106b are about 80 mm apart by the nominal size of the targets, not 8; give it in mm" in said
 
 
-def test_one_mirrored_picture_and_a_target_that_is_there_twice_are_left_out(
+def test_a_mirrored_picture_a_copy_and_a_target_that_is_there_twice_are_left_out(
     tmp_path: Path, frame: list[NDArray[np.uint8]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     sheets = frame_sheets()
     twice = [*sheets[:15], replace(sheets[0], place=np.array([390.0, 390.0, 0.0]), axes=np.eye(3))]
     drawing = Drawing(_CAMERA, random=np.random.default_rng(2))
     both = drawing.picture(twice, *looking(np.array([0.0, 0.0, -200.0]), 1700.0, along=5.0, up=5.0, roll=0.0))
-    folder = _written(tmp_path / "K1", [*frame, frame[0][:, ::-1], both])
+    folder = _written(tmp_path / "K1", [*frame, frame[0][:, ::-1], both, frame[1]])
     assert _calibrate(folder, "-o", tmp_path / "out") == 0
     said = capsys.readouterr().out
     assert "note: K1/5.png is left out: it shows the targets in a mirror" in said
+    assert "note: K1/7.png is left out: it is a copy of K1/1.png" in said
     assert "note: target 100 is left out: it is twice in K1/6.png" in said
     assert "T100a" not in (tmp_path / "out" / "network.json").read_text()
 

@@ -17,6 +17,8 @@ UNITS: Final = 24  # raster cells along a square: its marker begins after 5 of t
 _DARK, _BRIGHT, _BEHIND = 30.0, 210.0, 120.0
 _FINE: Final = 4  # rays along a pixel's side
 _FINER: Final = 4  # raster cells of targets with circles for one of the others
+#: What a corner reaches that is computed: nothing is bent within it.
+EXACT: Final = ((1e-3, 0.0), (0.0, 1e-3))
 _STRIP: Final = 16  # rows of the fine grid that are computed at a time: their arrays stay in the processor's cache
 
 

@@ -14,6 +14,7 @@ from analysis.targets.report import report, to_json
 from photogrammetry.reports.document import as_html, as_text
 from rig.errors import BadInputError
 from tests.analysis.targets.drawn import (
+    EXACT,
     Array,
     DrawnCamera,
     Sheet,
@@ -48,7 +49,7 @@ def _pictures(
 
 
 def _corner(at: Array, sigma: float) -> Corner:
-    return Corner(float(at[0]), float(at[1]), sigma, sigma)
+    return Corner(float(at[0]), float(at[1]), sigma, sigma, EXACT)
 
 
 def _frame() -> dict[str, Array]:
@@ -119,6 +120,24 @@ def test_a_target_that_moved_is_named_and_left_out() -> None:
     moved = [note for note in made.notes if "moved on the frame" in note]
     assert len(moved) == 1
     assert moved[0].startswith("target 106 is left out")
+    c = made.calibration.outcome.adjustment.parameters(0)[0][0]
+    assert abs(c.value - _CAMERA.c) < 3.0 * c.sigma
+
+
+def test_a_target_that_another_one_hides_in_part_has_not_moved() -> None:
+    places = _frame()
+    pictures = _pictures(_stations(), lambda _: places)
+    for n in (2, 5, 8):  # the edge of a sheet beside two of its corners: they are measured beside themselves
+        corners = dict(pictures[n].sight.corners)
+        for name in ("T106a", "T106b"):
+            corners[name] = replace(corners[name], x=corners[name].x + 1.5)
+        pictures[n] = replace(pictures[n], sight=replace(pictures[n].sight, corners=corners))
+    made = _calibrated(pictures)
+    (note,) = [note for note in made.notes if "106" in note]
+    assert note.startswith("target 106: what does not fit its other pictures is left out: ")
+    for corner in ("T106a in K1/2", "T106b in K1/2", "T106a in K1/5", "T106b in K1/8"):
+        assert corner in note
+    assert "nothing hides a part of it" in note
     c = made.calibration.outcome.adjustment.parameters(0)[0][0]
     assert abs(c.value - _CAMERA.c) < 3.0 * c.sigma
 

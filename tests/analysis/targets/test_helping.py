@@ -8,7 +8,7 @@ from analysis.targets.detection import Corner, Sight
 from analysis.targets.moving import Watch
 from analysis.targets.pattern import Layout
 from analysis.targets.views import PICTURES, views
-from tests.analysis.targets.drawn import Array, DrawnCamera, board_sheet, corner_places, looking, seen_at
+from tests.analysis.targets.drawn import EXACT, Array, DrawnCamera, board_sheet, corner_places, looking, seen_at
 
 _CAMERA = DrawnCamera((480, 360), 600.0)
 _SIDES = ["target_left_near", "target_right_near", "target_upper_near", "target_lower_near"]
@@ -19,7 +19,7 @@ def _sight(
 ) -> Sight:
     at = np.zeros(3) if shift is None else shift
     seen = seen_at(_CAMERA, *looking(at, away, along=along, up=up, roll=roll), corner_places([board_sheet()]))
-    corners = {name: Corner(float(x), float(y), 0.01, 0.01) for name, (x, y) in seen.items()}
+    corners = {name: Corner(float(x), float(y), 0.01, 0.01, EXACT) for name, (x, y) in seen.items()}
     return Sight(_CAMERA.size, corners, {}, (), mirrored=False, blur=0.8)
 
 

@@ -67,6 +67,7 @@ class Calibrating(Model):
     still: bool = Field(False, description="whether the target is still")
     full: bool = Field(False, description="no more pictures are kept: there are as many as an adjustment needs at most")
     folder: str | None = Field(None, description="of the pictures: `svev calibrate --pictures` reads it")
+    printed: CalibratingOrder | None = Field(None, description="of what the pictures are; another order begins anew")
     taken: int = Field(0, description="pulses of which pictures were kept")
     cameras: tuple[SeenTarget, ...] = ()
     problem: Statement | None = Field(None, description="why nothing is found or computed, and what to do")

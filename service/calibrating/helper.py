@@ -90,6 +90,7 @@ class _Situation:
             still=self.state is CalibratingState.LOOKING and self.seen.still,
             full=len(taken) >= MOST_PICTURES,
             folder=None if self.pictures is None else str(self.pictures.pictures),
+            printed=None if self.pictures is None else self.pictures.order,
             taken=len(taken),
             cameras=() if self.pictures is None else self._targets(self.pictures.regions),
             problem=self.problem,

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from playwright.sync_api import Page, expect
 from scipy.stats import chi2
 
-from rig.api.calibrating import CalibratedLens, CalibratingState, SeenTarget
+from rig.api.calibrating import CalibratedLens, CalibratingOrder, CalibratingState, SeenTarget
 from rig.api.statement import Level, Statement
 from rig.settings.file import CONFIG, load_rig
 from simrig.world.scenario import load_scenario
@@ -80,7 +80,12 @@ def test_it_says_what_to_show_and_offers_what_can_be_done(
     service.arm()
     expect(page.locator("#aim-image")).not_to_have_js_property("naturalWidth", 0)
     page.get_by_text("What was printed").click()
-    page.get_by_role("spinbutton", name="Squares across").fill("11")
+    across = page.get_by_role("spinbutton", name="Squares across")
+    across.fill("")
+    page.get_by_role("button", name="Take pictures").click()
+    expect(across).to_be_focused()  # it says what is wrong with it
+    assert service.calibrating.orders == []
+    across.fill("11")
     service.calibrating.show(cameras=_SEEN, taken=4)
     page.get_by_role("button", name="Take pictures").click()
     expect(page.locator("#calibrating-said")).to_have_text("Target found. Hold it still.")
@@ -114,6 +119,7 @@ def test_it_says_what_to_show_and_offers_what_can_be_done(
     lenses = tuple(_lens(name, good=name != "K3") for name in CAMERAS)
     service.calibrating.show(state=CalibratingState.DONE, lenses=lenses)
     expect(page.locator(".lens")).to_have_count(3)
+    expect(page.locator(".lens").first).to_be_in_viewport()
     expect(page.locator(".lens").nth(2)).to_contain_text("Not good enough for 1:1000")
     expect(page.locator(".lens").nth(2)).to_contain_text(_MORE.text)
     expect(page.locator("#calibrating-residuals .arrow")).to_have_count(2)
@@ -122,6 +128,26 @@ def test_it_says_what_to_show_and_offers_what_can_be_done(
     page.get_by_role("button", name="Put it into the rig file").click()
     expect(page.locator("#calibrating-saved")).to_be_visible()
     assert service.calibrating.shown.saved
+
+
+def test_pictures_go_on_with_what_was_printed_after_the_page_was_loaded_anew(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    printed = CalibratingOrder(columns=8, rows=5, square_mm=45.5, target_mm=150.0)
+    service.calibrating.show(cameras=_SEEN, taken=4, printed=printed)
+    page = open_page(f"{panel.url}/#/aim")
+    go_on = page.get_by_role("button", name="Go on taking pictures")
+    expect(go_on).to_be_visible()
+    page.get_by_text("What was printed").click()
+    expect(page.get_by_role("spinbutton", name="Squares across")).to_have_value("8")
+    page.get_by_role("spinbutton", name="Squares down").fill("7")
+    service.calibrating.show(taken=5)
+    expect(page.locator("#calibrating-counts dd").first).to_have_text("5")
+    expect(page.get_by_role("spinbutton", name="Squares down")).to_have_value("7")  # what one types stays
+    page.get_by_role("spinbutton", name="Squares down").fill("5")
+    go_on.click()
+    expect(page.get_by_role("button", name="Stop", exact=True)).to_be_visible()
+    assert service.calibrating.orders == [printed]
 
 
 @pytest.mark.parametrize(("look", "width"), [("light", 768), pytest.param("dark", 1280, marks=pytest.mark.long)])

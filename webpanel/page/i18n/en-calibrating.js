@@ -6,6 +6,7 @@ export const words = {
   "calibrating.columns": "Squares across",
   "calibrating.rows": "Squares down",
   "calibrating.square": "Side of a square, mm",
+  "calibrating.target": "White square of a single target, mm",
   "calibrating.begin": "Take pictures",
   "calibrating.go_on": "Go on taking pictures",
   "calibrating.anew": "Begin anew",

@@ -6,6 +6,7 @@ export const words = {
   "calibrating.columns": "Ruter bortover",
   "calibrating.rows": "Ruter nedover",
   "calibrating.square": "En rutes side, mm",
+  "calibrating.target": "Hvit rute på et enkelt mål, mm",
   "calibrating.begin": "Ta bilder",
   "calibrating.go_on": "Ta flere bilder",
   "calibrating.anew": "Begynn på nytt",

@@ -8,6 +8,8 @@ import { attempt } from "../shared/snacks.js";
 import { known, watch } from "../shared/store.js";
 import { drawCovered, drawResiduals } from "./lensdrawing.js";
 
+/** The fields that say what was printed, by what follows `calibrating-` in their names. */
+const FIELDS = ["columns", "rows", "square", "target"];
 /** Between two looks at what the helper sees, and at one that does nothing. */
 const OFTEN_MS = 400;
 const SELDOM_MS = 5000;
@@ -27,10 +29,12 @@ let ordered = false;
 let orders = 0;
 /** What the drawings show now, so that they are not drawn again. */
 let drawn = "";
+/** Of what the pictures are, as the fields show it: another tab, or this page before it was loaded anew, may have said so. */
+let filled = "";
 
 export function startCalibrating() {
-  $("calibrating-begin").addEventListener("click", () => void order("POST", "calibration", printed(false)));
-  $("calibrating-anew").addEventListener("click", () => void order("POST", "calibration", printed(true)));
+  $("calibrating-begin").addEventListener("click", () => begin(false));
+  $("calibrating-anew").addEventListener("click", () => begin(true));
   $("calibrating-stop").addEventListener("click", () => void order("DELETE", "calibration"));
   $("calibrating-undo").addEventListener("click", () => void order("DELETE", "calibration/pictures/last"));
   $("calibrating-compute").addEventListener("click", () => void order("POST", "calibration/compute"));
@@ -87,14 +91,31 @@ async function order(method, path, body) {
 }
 
 /** @param {boolean} anew */
+function begin(anew) {
+  const wrong = FIELDS.map((name) => $(`calibrating-${name}`)).find((field) => !field.checkValidity());
+  if (wrong) {
+    wrong.closest("details").open = true; // a field that is not seen cannot say what it wants
+    wrong.reportValidity();
+  } else void order("POST", "calibration", printed(anew));
+}
+
+/** @param {boolean} anew */
 function printed(anew) {
-  const [columns, rows, square] = ["columns", "rows", "square"].map((name) => Number($(`calibrating-${name}`).value));
-  return { columns, rows, square_mm: square, anew };
+  const [columns, rows, square, target] = FIELDS.map((name) => $(`calibrating-${name}`).valueAsNumber);
+  return { columns, rows, square_mm: square, target_mm: target, anew };
 }
 
 /** @param {Calibrating} found */
 function enter(found) {
+  const concluded = helper?.state === "computing" && (found.state === "done" || found.state === "failed");
   helper = found;
+  const now = JSON.stringify(found.printed);
+  if (found.printed && now !== filled) {
+    const { columns, rows, square_mm: square, target_mm: target } = found.printed;
+    [columns, rows, square, target].forEach((value, index) => { $(`calibrating-${FIELDS[index]}`).value = String(value); });
+    filled = now;
+  }
+  if (concluded) requestAnimationFrame(() => $("calibrating").scrollIntoView()); // what was hidden above it is there again
   drawCalibrating();
 }
 
@@ -112,7 +133,7 @@ export function drawCalibrating() {
   $("calibrating-undo").hidden = !taken || state === "computing" || (helper?.saved ?? false);
   $("calibrating-compute").hidden = !taken || state === "computing" || state === "done";
   for (const name of ["begin", "anew", "stop", "undo", "compute", "save"]) $(`calibrating-${name}`).disabled = ordered;
-  $("aim").classList.toggle("helping", looking);
+  $("aim").classList.toggle("helping", isWorking());
   drawSaid(state, seen, taken);
   drawNext(looking ? seen : null);
   const cells = (seen?.cells ?? []).flat();

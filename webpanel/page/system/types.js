@@ -76,6 +76,7 @@
  * @property {boolean} still
  * @property {boolean} full
  * @property {string|null} folder
+ * @property {{columns: number, rows: number, square_mm: number, target_mm: number}|null} printed
  * @property {number} taken
  * @property {SeenTarget[]} cameras
  * @property {import("../shared/types.js").Statement|null} problem

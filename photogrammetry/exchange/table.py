@@ -26,7 +26,7 @@ _USUAL: Final[Mapping[str, tuple[str, ...]]] = {
 ENDINGS: Final = tuple(_USUAL)
 #: Other names of columns.
 _SAME: Final = {
-    **dict.fromkeys(("point", "id", "nr", "ball", "target"), "name"),
+    **dict.fromkeys(("point", "id", "nr", "ball", "target", "punkt", "navn"), "name"),
     **{f"sigma{gap}{axis}": f"s{axis}" for gap in ("", "_") for axis in "xyz"},
     "sigma": "s",
     "xh": "x0",
@@ -54,9 +54,9 @@ _WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
 _FAR_MM: Final = 1.0
 #: Axes of a surveyor, by what they are: X is east, Y north, Z height, which is right-handed.
 _SURVEYORS: Final = {
-    **dict.fromkeys(("e", "east", "easting"), "x"),
-    **dict.fromkeys(("n", "north", "northing"), "y"),
-    **dict.fromkeys(("h", "height"), "z"),
+    **dict.fromkeys(("e", "east", "easting", "øst"), "x"),
+    **dict.fromkeys(("n", "north", "northing", "nord"), "y"),
+    **dict.fromkeys(("h", "height", "høyde"), "z"),
 }
 
 

@@ -180,6 +180,10 @@ def test_an_exposure_longer_than_the_period(
     assert "shorten exposure_us, or lower trigger.rate_hz" in said
 
 
+def _day(utc_s: float) -> str:
+    return time.strftime("%Y-%m-%d", time.localtime(utc_s))
+
+
 def test_a_clock_in_the_future_or_a_file_from_there(
     tmp_path: Path, loopback: Loopback, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -193,9 +197,7 @@ def test_a_clock_in_the_future_or_a_file_from_there(
         os.utime(file, (next_year, next_year))
     rig = write_rig(tmp_path, loopback, backend="sim")
     assert main(["record", "--rig", str(rig), "--seconds", "0.2", "--out", str(tmp_path / "out")]) == 0
-    doubt = (
-        f"{time.gmtime(next_year).tm_year}-{time.strftime('%m-%d', time.localtime(next_year))}: one of the two dates"
-    )
+    doubt = f"{_day(next_year)}: one of the two dates"
     said = capsys.readouterr().err
     assert f"{log} was written on {doubt}" in said
     assert "if today is another day, set it: sudo date -s" in said
@@ -203,3 +205,19 @@ def test_a_clock_in_the_future_or_a_file_from_there(
     assert main(["orient", str(network), "-o", str(tmp_path / "poses.json"), "--report", str(report)]) == 0
     assert f"{network} was written on {doubt}" in capsys.readouterr().err
     assert f"the date may be wrong: the clock says {time.gmtime().tm_year}" in (report / "protocol.txt").read_text()
+
+
+def test_a_clock_before_the_recording_is_told_by_analyze_before_anything_else(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    next_year = time.time() + 366 * 86_400
+    (log := tmp_path / "jump.mcap").write_bytes(b"cut off at once")
+    (survey := tmp_path / "survey.json").write_text(json.dumps(survey_json(training(), seed=1)))
+    analyze = ["analyze", str(log), "--survey", str(survey), "--out", str(tmp_path / "out")]
+    assert main(analyze) == 2
+    assert "the clock says" not in capsys.readouterr().err
+    os.utime(log, (next_year, next_year))
+    assert main(analyze) == 2
+    first, *_ = capsys.readouterr().err.splitlines()
+    assert first.startswith("warning: the clock says")
+    assert f"{log} was written on {_day(next_year)}: one of the two dates is wrong; if today is another day" in first

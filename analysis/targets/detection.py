@@ -181,6 +181,6 @@ def _measured(
     discs &= discs.all(axis=1, keepdims=True)  # all of a target gave the offset of each
     corners = {}
     for i in np.flatnonzero(good).tolist():
-        (a, b), (c, d) = reach[i].tolist()
-        corners[names[i]] = Corner(*map(float, (*xy[i], *sigma[i])), ((a, b), (c, d)))
+        (x, y), (sigma_x, sigma_y), ((a, b), (c, d)) = xy[i].tolist(), sigma[i].tolist(), reach[i].tolist()
+        corners[names[i]] = Corner(x, y, sigma_x, sigma_y, ((a, b), (c, d)))
     return corners, float(np.median(blur[good])) if good.any() else np.nan

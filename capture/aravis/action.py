@@ -12,10 +12,16 @@ from rig.action import ActionKeys
 from rig.clocks import NS_PER_S
 from rig.errors import CameraError
 
-#: Features that switch PTP on, and those that say what has become of it.
-_PTP: Final = (("PtpEnable", "PtpStatus"), ("GevIEEE1588", "GevIEEE1588Status"), ("PtpMode", "PtpStatus"))
+#: Features that switch PTP on, and those that say what has become of it: of the convention, Basler and FLIR before it,
+#: Allied Vision, Teledyne Dalsa.
+_PTP: Final = (
+    ("PtpEnable", ("PtpStatus",)), ("GevIEEE1588", ("GevIEEE1588StatusLatched", "GevIEEE1588Status")),
+    ("PtpMode", ("PtpStatus",)), ("ptpMode", ("ptpStatus",)),
+)  # fmt: skip
+#: With most makers the status is that of the last of these commands.
+_LATCHES: Final = ("PtpDataSetLatch", "GevIEEE1588DataSetLatch")
 #: Of `PtpMode`: it finds the master by itself, as the switches of the others have it, or follows one.
-_FOLLOWS: Final = ("Auto", "Slave")
+_FOLLOWS: Final = ("Auto", "Automatic", "Slave")
 #: Its clock is that of all cameras: it follows the master, or is the master itself.
 _LOCKED: Final = frozenset({"Slave", "Master"})
 #: A camera whose clock is not locked after so long is tried again later.
@@ -75,14 +81,15 @@ def lock_clock(features: Features, name: str) -> None:
     Raises:
         CameraError: it has no PTP, or its clock is not locked after some seconds.
     """
-    enable, status = next(((enable, status) for enable, status in _PTP if features.has(enable)), ("", ""))
+    enable, states = next(((enable, states) for enable, states in _PTP if features.has(enable)), ("", ()))
     if not enable or not (features.choose(enable, *_FOLLOWS) or features.switch(enable, on=True)):
         raise CameraError(
             f"camera {name} has no PTP, which scheduled action commands need: set trigger.scheduled = false, or use "
             '[trigger] source = "external"'
         )
+    status = next(filter(features.has, states), "its status")
     end = time.monotonic() + _LOCK_S
-    while (state := features.chosen(status)) not in _LOCKED:
+    while (state := _latched(features, status)) not in _LOCKED:
         if time.monotonic() > end:
             raise CameraError(
                 f"camera {name} has no PTP lock ({status} is {state or 'unknown'}): check the PTP master and the "
@@ -94,3 +101,10 @@ def lock_clock(features: Features, name: str) -> None:
         raise CameraError(
             f"camera {name} counts {tick_hz:g} ticks per second though PTP is on, not ns: use its newest firmware"
         )
+
+
+def _latched(features: Features, status: str) -> str | None:
+    """Present state of PTP; None if the camera does not tell."""
+    for latch in _LATCHES:
+        features.execute(latch)
+    return features.chosen(status)

@@ -258,7 +258,8 @@ class AravisCamera:
 
     def _set_pace(self, settings: CameraSettings, network: NetworkSettings, period_ns: int, wire: Wire) -> float:
         """Leave time between packets; how long a frame takes, ns."""
-        frames = Frames(settings.frame_bytes, self._camera.gv_get_packet_size(), period_ns)
+        tick_hz = self._device.get_timestamp_tick_frequency() or NS_PER_S
+        frames = Frames(settings.frame_bytes, self._camera.gv_get_packet_size(), period_ns, tick_hz)
         pace = set_pace(self._features, settings.name, network.packet_delay, frames, wire)
         self._notices += [f"camera {settings.name}: {notice}" for notice in pace.notices]
         return pace.frame_ns

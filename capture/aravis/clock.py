@@ -12,7 +12,6 @@ from capture.aravis.library import Aravis, GLib
 from rig.clocks import NS_PER_S, ClockLatch, DeviceNs, HostNs, host_now
 from rig.errors import CameraError
 
-_FREQUENCY_HIGH, _FREQUENCY_LOW = 0x093C, 0x0940
 _CONTROL, _LATCH = 0x0944, 2
 _HIGH, _LOW = 0x0948, 0x094C
 #: The same by features: the command, where its result is, and ticks of the result per second; 0: those of the clock.
@@ -98,7 +97,7 @@ def _advancing(name: str, ways: Iterable[_Reading]) -> _Reading:
 
 
 def _frequency(name: str, device: "Aravis.Device") -> int:
-    frequency = int(device.read_register(_FREQUENCY_HIGH)) << 32 | int(device.read_register(_FREQUENCY_LOW))
+    frequency = int(device.get_timestamp_tick_frequency())  # by the bootstrap registers: descriptions may lack it
     if frequency == 0:
         raise CameraError(
             f"camera {name} has no clock (timestamp frequency 0), so its frames cannot be tied to pulses: "

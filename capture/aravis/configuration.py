@@ -33,7 +33,11 @@ _SWITCHED_OFF: Final = {
     "ChunkModeActive": "it adds data to its frames",
     "TestPattern": "it may send a test picture",
     "TestImageSelector": "it may send a test picture",
+    "ImageCompressionMode": "its frames are compressed",
+    "transferTurboMode": "its frames are compressed",
+    "StreamHoldEnable": "it keeps its frames to itself",
 }
+_TRANSFER: Final = "TransferControlMode"
 #: Changes of the image that would make every measurement wrong.
 _AS_THE_SENSOR_SEES: Final = ("ReverseX", "ReverseY")
 #: As an enumeration says that nothing is reduced: 1, x1, Off, BinningHorizontal1.
@@ -49,6 +53,8 @@ _RATE_SHARE: Final = 0.99
 _GAMMA: Final = 0.01
 #: Exposure and gain may differ so much from those wanted before that is said: steps of the sensor are smaller.
 _EXPOSURE_SHARE, _EXPOSURE_US = 0.02, 20.0
+#: Microseconds in units of exposure times; the convention has microseconds, and many tell no unit.
+_UNITS_US: Final = {"s": 1e6, "ms": 1e3, "ns": 1e-3}
 
 
 def configure(
@@ -89,6 +95,8 @@ def _switch_off(features: Features) -> list[str]:
         for name, cost in _SWITCHED_OFF.items()
         if features.has(name) and not features.switch(name, on=False)
     ]
+    if features.has(_TRANSFER) and features.choose(_TRANSFER, "Basic", "Automatic") is None:
+        notices.append(f"{_TRANSFER} stays {features.chosen(_TRANSFER)}: it sends its frames only when it is told to")
     if not features.has("GammaEnable") and not features.has("GammaEnabled"):
         gamma = features.set_number("Gamma", 1.0)
         if gamma is not None and abs(gamma - 1.0) > _GAMMA:
@@ -153,11 +161,12 @@ def _set_exposure(features: Features, wanted_us: float, *, timed: bool) -> list[
         return ["its exposure time cannot be set (ExposureMode): motion blur and brightness are what the camera makes"]
     name = features.first_number("ExposureTime", "ExposureTimeAbs", "Exposure")
     if name is not None:
-        got = features.set_number(name, wanted_us)
+        step_us = _UNITS_US.get(features.unit(name), 1.0)
     else:
-        step_us = features.number("ExposureTimeBaseAbs") or 1.0
-        steps = features.set_number("ExposureTimeRaw", wanted_us / step_us)
-        got = None if steps is None else steps * step_us
+        name = "ExposureTimeRaw"
+        step_us = features.number("ExposureTimeBaseAbs") or _UNITS_US.get(features.unit(name), 1.0)
+    steps = features.set_number(name, wanted_us / step_us)
+    got = None if steps is None else steps * step_us
     if got is None:
         return ["its exposure time cannot be set: motion blur and brightness are what the camera makes"]
     if abs(got - wanted_us) > max(_EXPOSURE_SHARE * wanted_us, _EXPOSURE_US):

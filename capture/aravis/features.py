@@ -166,22 +166,26 @@ class Features:
         try:
             if not self._is_number(name):
                 return None
-            self.remember(name)
-            if isinstance(self._device.get_feature(name), Aravis.GcFloat):
-                low, high = self._device.get_float_feature_bounds(name)
-                value, step = min(max(value, low), high), self._float_step(name)
-                if step > 0:
-                    value = low + step * min(round((value - low) / step), math.floor((high - low) / step))
+            value = self._possible(name, value, up_to=up_to)
+            if self.number(name) != value:
+                self.remember(name)
                 self._write(name, value)
-            else:
-                low, high = self._device.get_integer_feature_bounds(name)
-                step = max(1, self._device.get_integer_feature_increment(name))
-                steps = (min(max(value, low), high) - low) / step
-                steps = min(math.floor(steps) if up_to else round(steps), (high - low) // step)
-                self._write(name, low + steps * step)
         except GLib.Error:
             return None
         return self.number(name)
+
+    def _possible(self, name: str, value: float, *, up_to: bool) -> float:
+        """The value within the limits and steps of a number that is nearest to one, or next below it."""
+        if isinstance(self._device.get_feature(name), Aravis.GcFloat):
+            low, high = self._device.get_float_feature_bounds(name)
+            value, step = min(max(value, low), high), self._float_step(name)
+            if step > 0:
+                value = low + step * min(round((value - low) / step), math.floor((high - low) / step))
+            return float(value)
+        low, high = self._device.get_integer_feature_bounds(name)
+        step = max(1, self._device.get_integer_feature_increment(name))
+        steps = (min(max(value, low), high) - low) / step
+        return int(low + min(math.floor(steps) if up_to else round(steps), (high - low) // step) * step)
 
     def _float_step(self, name: str) -> float:
         """Step of a float; 0 if it has none, as most."""

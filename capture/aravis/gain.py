@@ -15,6 +15,8 @@ from rig.settings.camera import CameraSettings
 _WHOLE: Final = ("All", "AnalogAll", "SensorAll", "SensorAnalog", "Analog", "Tap1")
 #: Gains behind the sensor, which only multiply noise and grey values.
 _DIGITAL: Final = ("DigitalAll", "Digital")
+#: Units of a gain in dB or as a factor; others are the maker's own.
+_UNITS: Final = ("db", "x", "")
 #: Gain may differ so much from that wanted before that is said: steps of the sensor are smaller.
 _GAIN_DB: Final = 0.5
 
@@ -64,6 +66,8 @@ def _set_whole(features: Features, settings: CameraSettings) -> list[str]:
     name = _steps(features)
     bounds = None if name is None else features.bounds(name)
     if bounds is None:
+        if (name := features.first_number("Gain", "GainAbs")) is not None:
+            return [f"its gain is in {features.unit(name)}, not in dB: it stays as it was left"]
         return ["it has no gain"] if wanted_db else []
     least, most, _ = bounds
     if settings.gain_step_db is not None:
@@ -78,9 +82,10 @@ def _set_whole(features: Features, settings: CameraSettings) -> list[str]:
 
 
 def _measured(features: Features) -> str | None:
-    """The gain in dB or as a factor, if there is one: an integer without a unit counts steps."""
+    """The gain in dB or as a factor, if there is one: an integer in anything else counts steps."""
     name = features.first_number("Gain", "GainAbs")
-    return None if name is None or (features.bounds(name) is not None and not features.unit(name)) else name
+    units = _UNITS if name is None or features.bounds(name) is None else _UNITS[:1]
+    return name if name is not None and features.unit(name).lower() in units else None
 
 
 def _steps(features: Features) -> str | None:
@@ -90,7 +95,7 @@ def _steps(features: Features) -> str | None:
 
 def _set_db(features: Features, name: str, wanted_db: float) -> float | None:
     """Set a gain in dB or as a factor; what it is now, dB, or None."""
-    if features.unit(name) or features.least(name) != 1.0:
+    if features.unit(name).lower() == "db" or features.least(name) != 1.0:
         return features.set_number(name, wanted_db)
     factor = features.set_number(name, 10 ** (wanted_db / 20))
     return None if not factor else 20 * math.log10(factor)

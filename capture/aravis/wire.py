@@ -25,7 +25,6 @@ _DELAY_REGISTER: Final = "ArvGevSCPD"
 _LIMITS: Final = ("StreamBytesPerSecond", "DeviceLinkThroughputLimit")
 _LIMIT_MODE: Final = "DeviceLinkThroughputLimitMode"
 _SWITCHED: Final = ("DeviceLinkThroughputLimit",)  # by it
-_TICKS: Final = "GevTimestampTickFrequency"
 #: Bytes of a packet that are no picture: headers of IP, UDP and GVSP; and those around it on the wire: Ethernet header,
 #: check sum, preamble, gap.
 _HEADER_BYTES, _WIRE_BYTES = 36, 38
@@ -76,11 +75,13 @@ class Frames:
         frame_bytes: of a frame.
         packet_size: of a packet, its IP header included, bytes.
         period_ns: time between two frames.
+        tick_hz: ticks of its clock per second, in which it counts delays.
     """
 
     frame_bytes: int
     packet_size: int
     period_ns: int
+    tick_hz: int = NS_PER_S
 
     @property
     def packets(self) -> int:
@@ -120,8 +121,9 @@ def set_pace(features: Features, name: str, wanted: PacketDelay, frames: Frames,
     notices = []
     if wanted != "keep":
         delay_ns = _spread(frames, wire) if wanted == "auto" else wanted * NS_PER_US
-        notices = _write(features, delay_ns, frames.packet_size * NS_PER_S / (wire_ns + delay_ns or math.inf))
-    each_ns, by = _slowest(features, frames.packet_size, wire_ns)
+        ticks = round(delay_ns * frames.tick_hz / NS_PER_S)
+        notices = _write(features, ticks, frames.packet_size * NS_PER_S / (wire_ns + delay_ns or math.inf))
+    each_ns, by = _slowest(features, frames, wire_ns)
     pace = Pace(each_ns * frames.packets, by, tuple(notices))
     if pace.frame_ns > frames.period_ns:
         raise CameraError(
@@ -144,15 +146,14 @@ def _spread(frames: Frames, wire: Wire) -> float:
     return max(0.0, min((wire.cameras - 1) * wire_ns, longest))
 
 
-def _write(features: Features, delay_ns: float, bytes_s: float) -> list[str]:
+def _write(features: Features, ticks: int, bytes_s: float) -> list[str]:
     """Set the delay by the first way that the camera has, and take away other limits.
 
     Args:
         features: of the camera.
-        delay_ns: time between two packets.
+        ticks: time between two packets, by its clock.
         bytes_s: the same as a rate; 0 if it is not known.
     """
-    ticks = round(delay_ns * (features.number(_TICKS) or NS_PER_S) / NS_PER_S)
     delayed = _delay(features, _DELAY, ticks)
     limits = [limit for limit in _LIMITS if features.has(limit)]
     limited = not delayed and ticks > 0 and bytes_s > 0 and bool(limits)
@@ -178,14 +179,13 @@ def _delay(features: Features, name: str, ticks: int) -> bool:
     return False
 
 
-def _slowest(features: Features, packet_size: int, wire_ns: float) -> tuple[float, str]:
+def _slowest(features: Features, frames: Frames, wire_ns: float) -> tuple[float, str]:
     """Time from one packet to the next, ns, and the feature that makes it so long; empty: the port alone."""
-    ticks_s = features.number(_TICKS) or NS_PER_S
-    delay_ns = (features.number(_DELAY) or 0.0) * NS_PER_S / ticks_s
+    delay_ns = (features.number(_DELAY) or 0.0) * NS_PER_S / frames.tick_hz
     ways = {"": wire_ns, _DELAY: wire_ns + delay_ns if delay_ns else 0.0}
     for limit in _LIMITS:
         off = limit in _SWITCHED and features.chosen(_LIMIT_MODE) == "Off"
         if (bytes_s := features.number(limit)) and not off:
-            ways[limit] = packet_size * NS_PER_S / bytes_s
+            ways[limit] = frames.packet_size * NS_PER_S / bytes_s
     by = max(ways, key=lambda way: ways[way])
     return ways[by], by

@@ -170,14 +170,16 @@ class Device:
             "TriggerSoftware": lambda: self._sensor.trigger(TriggerSource.SOFTWARE, host_now()),
             "CounterReset": self._reset_counter,
             "UserSetLoad": self._load_user_set,
-            "PtpDataSetLatch": self._latch_ptp,
         }.items():
             write(name, _command(command))
         clock, sensor = self._clock, self._sensor
         if "TimestampLatch" in self._registers:
             write("TimestampLatch", _command(self._latch_clock))
         read("PayloadSize", lambda: self._format().payload_bytes)
-        read("PtpStatus", lambda: clock.ptp_status(host_now()))
+        if self._registers.is_writable("PtpDataSetLatch"):
+            write("PtpDataSetLatch", _command(self._latch_ptp))
+        else:
+            read("PtpStatus", lambda: clock.ptp_status(host_now()))
         read("CounterValue", lambda: sensor.trigger_count)
         read("DeviceTemperature", self._temperature)
 
@@ -215,7 +217,9 @@ class Device:
         self._registers.set("TimestampLatchValue", ticks * NS_PER_S // tick_hz)
 
     def _latch_ptp(self) -> None:
-        self._registers.set("PtpOffsetFromMaster", self._clock.ptp_offset_ns(host_now()))
+        now = host_now()
+        self._registers.set("PtpStatus", self._clock.ptp_status(now))
+        self._registers.set("PtpOffsetFromMaster", self._clock.ptp_offset_ns(now))
 
     def _trigger_setting(self, name: str) -> Callable[[Value], Value]:
         """A hook for a setting that decides about the sensor's next trigger."""

@@ -88,6 +88,8 @@ _AUTO: Final = ("Off", "Once", "Continuous")
 _CONTINUOUS: Final = 2
 _SHORT_IDS: Final = frozenset({"GevGVSPExtendedIDMode"})
 _COUNTERS: Final = frozenset({"CounterValue", "CounterReset"})
+#: The status of PTP is that of the last of these commands; cameras without it tell the present one.
+_LATCH: Final = "PtpDataSetLatch"
 _PACKED_AS_BEFORE: Final = ("Mono8", "Mono10", "Mono10Packed", "Mono12", "Mono12Packed", "BayerRG8")
 #: An entry's place is its value, so the first input is the one that the trigger cable is plugged into.
 
@@ -97,7 +99,8 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
         formats=("Mono8", "Mono12", "Mono12Packed"),
         names={
             "ExposureTime": "ExposureTimeAbs", "AcquisitionFrameRate": "AcquisitionFrameRateAbs",
-            "DeviceTemperature": "TemperatureAbs",
+            "DeviceTemperature": "TemperatureAbs", _LATCH: "GevIEEE1588DataSetLatch",
+            "GevIEEE1588Status": "GevIEEE1588StatusLatched",
         },
         without=_SHORT_IDS | _COUNTERS | {"Gain", "PtpEnable", "PtpStatus"},
         entries={
@@ -115,7 +118,8 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
         ),
     ),
     Maker.FLIR: Dialect(
-        without=_COUNTERS | {"PtpEnable", "GevTimestampControlLatch", "GevTimestampControlReset"},
+        names={_LATCH: "GevIEEE1588DataSetLatch", "GevIEEE1588Status": "GevIEEE1588StatusLatched"},
+        without=_COUNTERS | {"PtpEnable", "PtpStatus", "GevTimestampControlLatch", "GevTimestampControlReset"},
         entries={
             "TriggerSelector": ("AcquisitionStart", "FrameStart", "FrameBurstStart"),
             "TriggerSource": ("Line0", "Line1", "Software", "Action0"),
@@ -129,6 +133,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             Extra("DeviceLinkThroughputLimitMode", 0, ("On", "Off")),
             Extra("DeviceLinkThroughputLimit", 3_000_000, maximum=125_000_000),
             Extra("ActionSelector", 0, ("Action0",), read_only=True),
+            Extra("AcquisitionResultingFrameRate", 170.0, real=True, read_only=True),
         ),
         latch_register=False,
     ),
@@ -144,6 +149,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             Extra("AcquisitionBurstFrameCount", 3, maximum=1023), Extra("TriggerDelay", 0.0, real=True),
             Extra("LineSelector", 0, ("Line0", "Line1")), Extra("LineMode", 0, ("Input", "Strobe")),
             Extra("LineDebouncerTime", 50), Extra("GammaEnable", 0, boolean=True), Extra("ActionSelector", maximum=0),
+            Extra("ResultingFrameRate", 60.0, real=True, read_only=True),
         ),
     ),
     Maker.ALLIED_VISION: Dialect(
@@ -152,7 +158,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             "PtpEnable": "PtpMode",
         },
         without=_COUNTERS
-        | {"AcquisitionFrameRateEnable", "GevIEEE1588", "GevIEEE1588Status", "OffsetX", "OffsetY", "GevSCPD"},
+        | {"AcquisitionFrameRateEnable", "GevIEEE1588", "GevIEEE1588Status", "OffsetX", "OffsetY", "GevSCPD", _LATCH},
         entries={
             "TriggerSelector": ("FrameStart", "AcquisitionStart", "AcquisitionEnd"),
             "TriggerSource": ("Line1", "Line2", "Software", "Action0", "Freerun"),
@@ -162,7 +168,8 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             Extra("ExposureAuto", _CONTINUOUS, ("Off", "Once", "Continuous", "Other")),
             Extra("GainAuto", _CONTINUOUS, _AUTO), Extra("GainSelector", 0, ("All",)),
             Extra("TriggerDelayAbs", 0.0, real=True), Extra("TriggerOverlap", 0, ("Off", "PreviousFrame")),
-            Extra("StreamBytesPerSecond", 3_000_000, maximum=124_000_000),
+            Extra("StreamBytesPerSecond", 3_000_000, maximum=124_000_000), Extra("StreamHoldEnable", 1, ("Off", "On")),
+            Extra("AcquisitionFrameRateLimit", 67.0, real=True, read_only=True),
         ),
     ),
     Maker.JAI: Dialect(
@@ -224,7 +231,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
         ),
     ),
     Maker.BASLER_ACE_2: Dialect(
-        without=_COUNTERS | {"PtpStatus", "GevIEEE1588", "GevIEEE1588Status", "PtpEnable", "GevSCPD"},
+        without=_COUNTERS | {"GevIEEE1588", "GevIEEE1588Status", "GevSCPD"},
         entries={
             "TriggerSelector": ("FrameBurstStart", "FrameStart"),
             "TriggerSource": ("Line1", "Line2", "Software", "Action1"),
@@ -233,6 +240,7 @@ DIALECTS: Final[Mapping[Maker, Dialect]] = {
             Extra("ExposureAuto", _CONTINUOUS, _AUTO), Extra("GainAuto", _CONTINUOUS, _AUTO),
             Extra("DeviceLinkThroughputLimitMode", 0, ("On",)),
             Extra("DeviceLinkThroughputLimit", 10_000_000, maximum=125_000_000),
+            Extra("BslResultingAcquisitionFrameRate", 51.0, real=True, read_only=True),
         ),
     ),
 }  # fmt: skip
@@ -249,6 +257,8 @@ def registers_of(maker: Maker, standard: Sequence[Register]) -> list[Register]:
 
 def _as_made(register: Register, dialect: Dialect) -> Register:
     if register.name == "GevTimestampControl" and not dialect.latch_register:
+        return replace(register, writable=False)
+    if register.name == _LATCH and _LATCH in dialect.without:
         return replace(register, writable=False)
     if register.name == "AcquisitionFrameRateEnable" and register.name in dialect.without:
         return replace(register, default=0)  # such a camera takes every pulse

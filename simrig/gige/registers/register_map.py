@@ -138,6 +138,10 @@ class RegisterMap:
     def __contains__(self, name: str) -> bool:
         return name in self._named
 
+    def is_writable(self, name: str) -> bool:
+        """Whether a register can be written at all."""
+        return self._named[name].writable
+
     def address(self, name: str) -> int:
         """Address of a register."""
         return self._named[name].address

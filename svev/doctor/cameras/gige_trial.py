@@ -6,7 +6,7 @@ from typing import Final
 
 from capture.aravis.wire import Wire
 from rig.clocks import host_now
-from rig.errors import BadInputError, CameraError
+from rig.errors import BadInputError, CameraError, CameraNotFoundError
 from rig.settings.camera import CameraSettings
 from rig.settings.model import RigSettings
 from rig.transport.child import begin
@@ -31,6 +31,9 @@ def try_camera(rig: RigSettings, settings: CameraSettings) -> Iterator[Finding]:
             )
         except (CameraError, BadInputError) as error:
             what, _, remedy = str(error).removeprefix("camera ").partition(": ")
+            if isinstance(error, CameraNotFoundError):  # and yet it has just said who it is
+                what = f"{name} answers, but its description of itself cannot be read"
+                remedy = "update its firmware, or use another camera"
             remedy = remedy or "look at svev cameras show {address}"
             yield failure(
                 Topic.CAMERAS, "check_would_be_refused", "would be refused: {what}", "{remedy}",

@@ -57,20 +57,27 @@ class Described:
 
     @contextmanager
     def opened(
-        self, *, packet_size: int | None = None, packet_delay: PacketDelay = "auto", **settings: Any
+        self,
+        *,
+        packet_size: int | None = None,
+        packet_delay: PacketDelay = "auto",
+        set_back: bool = False,
+        **settings: Any,
     ) -> Iterator[AravisCamera]:
         """The camera, opened by the back end."""
         wanted = self.rig.cameras[0].model_copy(update={"trigger_input": self.input, **settings})
         size = packet_size or self.rig.network.packet_size
         network = self.rig.network.model_copy(update={"packet_size": size, "packet_delay": packet_delay})
-        camera = AravisCamera(wanted, network, self.ring, self.rig.trigger.period_ns)
+        camera = AravisCamera(wanted, network, self.ring, self.rig.trigger.period_ns, set_back=set_back)
         try:
             yield camera
         finally:
             camera.close()
 
     def leave(self, values: Sequence[tuple[str, str | float]]) -> None:
-        """What another program has left behind, feature by feature; an enumeration's value by its name."""
+        """What another program or the maker has left, feature by feature; an enumeration's value by its name."""
+        registers = self._registers
+        registers.made = False
         with _controlled(self.rig.cameras[0].address) as device:
             filling = _Filling(device, ET.Element("none"))
             for name, value in values:
@@ -78,12 +85,22 @@ class Described:
                     device.set_string_feature_value(name, value)
                 else:
                     filling.set(name, value)
+        registers.made = True
 
     def lock(self, address: int, switch: int) -> None:
         """Have the camera refuse to have an address written while there is 0 at another."""
+        registers = self._registers
+        registers.refuses = lambda place: place == address and not any(registers.read(switch, 4))
+
+    def memory(self) -> dict[int, bytes]:
+        """All registers but those of the standard, by address; 0 stands where nothing was ever written."""
+        return {address: data for address, data in self._registers._others.items() if any(data)}
+
+    @property
+    def _registers(self) -> DescribedMap:
         registers = self._camera._device._registers
         assert isinstance(registers, DescribedMap)
-        registers.refuses = lambda place: place == address and not any(registers.read(switch, 4))
+        return registers
 
     def start(self, camera: AravisCamera) -> None:
         """Start, and have the simulated sensor obey what the registers say now."""

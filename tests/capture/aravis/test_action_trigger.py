@@ -166,7 +166,7 @@ def test_a_camera_without_reference_time_and_one_that_answers_nothing_are_told_b
     assert min(first.refused, second.unanswered) >= 3
 
 
-@pytest.mark.parametrize("maker", [Maker.FLIR, Maker.ALLIED_VISION])
+@pytest.mark.parametrize("maker", [Maker.FLIR, Maker.ALLIED_VISION, Maker.BASLER, Maker.BASLER_ACE_2])
 def test_ptp_is_switched_on_by_whatever_name_it_has(tmp_path: Path, loopback: Loopback, maker: Maker) -> None:
     with _hill(tmp_path, loopback, maker) as hill:
         _with(hill, _trigger(scheduled=True))

@@ -42,7 +42,14 @@ def _enumeration(name: str, entries: tuple[str, ...], address: int, *, more: str
 
 
 def _number(
-    name: str, address: int, limits: tuple[float, ...], *, real: bool = False, unit: str = "", index: str = ""
+    name: str,
+    address: int,
+    limits: tuple[float, ...],
+    *,
+    real: bool = False,
+    unit: str = "",
+    index: str = "",
+    access: str = "RW",
 ) -> str:
     low, high, *step = limits
     steps = f"<Inc>{step[0]}</Inc>" if step else ""
@@ -51,7 +58,8 @@ def _number(
         f'<{kind} Name="{name}"><pValue>{name}Register</pValue><Min>{low}</Min><Max>{high}</Max>{steps}'
         f"{f'<Unit>{unit}</Unit>' if unit else ''}</{kind}>"
     )
-    return node + _register(f"{name}Register", address, kind=f"{kind.removesuffix('eger')[:5]}Reg", index=index)
+    register = f"{kind.removesuffix('eger')[:5]}Reg"
+    return node + _register(f"{name}Register", address, kind=register, index=index, access=access)
 
 
 def _boolean(name: str, address: int) -> str:
@@ -191,6 +199,20 @@ KINDS = {
     "gain is a whole number of dB": Kind(
         _number("Gain", 0x20000, (0, 24), unit="dB"), instead=("Gain",), settings={"gain_db": 6.0}, wanted={"Gain": 6}
     ),
+    "gain counts tenths of dB": Kind(
+        _number("Gain", 0x20000, (0, 240), unit="0.1 dB"),
+        instead=("Gain",),
+        settings={"gain_db": 6.0, "gain_step_db": 0.1},
+        wanted={"Gain": 60},
+    ),
+    "gain is in a unit of its maker's own": Kind(
+        _number("Gain", 0x20000, (0, 100), real=True, unit="%"),
+        instead=("Gain",),
+        left=(("Gain", 40.0),),
+        settings={"gain_db": 6.0},
+        wanted={"Gain": 40.0},
+        notices=("its gain is in %, not in dB: it stays as it was left",),
+    ),
     "the delay between packets has steps": Kind(
         _number("GevSCPD", 0x20000, (0, 100_000, 400)),
         instead=("GevSCPD",),
@@ -233,6 +255,46 @@ KINDS = {
         settings={"exposure_us": 500.0},
         wanted={"ExposureTime": 493.6},
     ),
+    "exposure is in milliseconds": Kind(
+        _number("ExposureTime", 0x20000, (0.01, 100.0), real=True, unit="ms"),
+        instead=("ExposureTime",),
+        settings={"exposure_us": 500.0},
+        wanted={"ExposureTime": 0.5},
+    ),
+    "exposure is a whole number of nanoseconds": Kind(
+        _number("Exposure", 0x20000, (1000, 1_000_000_000), unit="ns"),
+        instead=("ExposureTime",),
+        settings={"exposure_us": 500.0},
+        wanted={"Exposure": 500_000},
+    ),
+    "bytes per second can only be read, and are the most that there are": Kind(
+        _number("StreamBytesPerSecond", 0x20000, (1_000_000, 124_000_000), access="RO"),
+        left=(("StreamBytesPerSecond", 124_000_000),),
+        wanted={"StreamBytesPerSecond": 124_000_000},
+    ),
+    "bytes per second can only be read, and could be more": Kind(
+        _number("StreamBytesPerSecond", 0x20000, (1_000_000, 124_000_000), access="RO"),
+        left=(("StreamBytesPerSecond", 100_000_000),),
+        notices=("StreamBytesPerSecond stays 1e+08 bytes per second",),
+    ),
+    "frames are kept, compressed, or sent only when that is asked for (Allied Vision, FLIR, Lucid, Dalsa)": Kind(
+        _enumeration("StreamHoldEnable", _OFF_ON, 0x20000)
+        + _enumeration("ImageCompressionMode", ("Off", "Lossless"), 0x20100)
+        + _enumeration("transferTurboMode", ("Off", "Active"), 0x20200)
+        + _enumeration("TransferControlMode", ("Basic", "UserControlled"), 0x20300),
+        left=(
+            ("StreamHoldEnable", "On"),
+            ("ImageCompressionMode", "Lossless"),
+            ("transferTurboMode", "Active"),
+            ("TransferControlMode", "UserControlled"),
+        ),
+        wanted={
+            "StreamHoldEnable": "Off",
+            "ImageCompressionMode": "Off",
+            "transferTurboMode": "Off",
+            "TransferControlMode": "Basic",
+        },
+    ),
     "the input is turned round by another program (FLIR, Basler)": Kind(
         _enumeration("LineSelector", ("Line1", "Line0"), 0x20000) + _boolean("LineInverter", 0x20100),
         left=(("LineInverter", 1),),
@@ -254,6 +316,10 @@ KINDS = {
         notices=("its input waits 40 us for a steady level (lineDebouncingPeriod)",),
     ),
 }
+
+
+#: A command: what was written there last is no setting.
+_ACQUISITION_STOP = next(each.address for each in all_registers(_IDENTITY, 0) if each.name == "AcquisitionStop")
 
 
 def _description(kind: Kind) -> bytes:
@@ -286,3 +352,17 @@ def test_a_camera_is_set_up_whatever_another_program_left(kind: Kind, tmp_path: 
     assert len(notices) == len(kind.notices), notices
     for notice, words in zip(notices, kind.notices, strict=True):
         assert words in notice
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS.keys())
+def test_what_another_program_left_is_there_again_after_a_trial(kind: Kind, tmp_path: Path, loopback: Loopback) -> None:
+    path = tmp_path / "dialect.xml"
+    path.write_bytes(_description(kind))
+    with described(path, tmp_path, loopback) as made:
+        made.leave(kind.left)
+        if kind.locked is not None:
+            made.lock(*kind.locked)
+        before = made.memory()
+        with made.opened(set_back=True, **kind.settings):
+            assert made.memory() != before
+        assert {**made.memory(), _ACQUISITION_STOP: None} == {**before, _ACQUISITION_STOP: None}

@@ -29,7 +29,7 @@ HARMLESS = {
     "TriggerMode": 1, "AcquisitionFrameRateEnable": 0, "ExposureAuto": 0, "GainAuto": 0, "GammaEnable": 0,
     "ReverseX": 0, "BinningHorizontal": 1, "BinningVertical": 1, "AcquisitionBurstFrameCount": 1, "TestPattern": 0,
     "TestImageSelector": 0, "TriggerOverlap": 1, "GainRaw": 0, "StreamBytesPerSecond": 124_000_000,
-    "LineSelector": 0, "LineInverter": 0, "ShutterMode": 1,
+    "LineSelector": 0, "LineInverter": 0, "ShutterMode": 1, "StreamHoldEnable": 0,
 }  # fmt: skip
 
 
@@ -84,11 +84,11 @@ def made(request: pytest.FixtureRequest, tmp_path: Path, loopback: Loopback) -> 
 
 
 @contextmanager
-def make(maker: Maker, tmp_path: Path, loopback: Loopback) -> Iterator[Made]:
+def make(maker: Maker, tmp_path: Path, loopback: Loopback, **options: Any) -> Iterator[Made]:
     rig = make_rig(tmp_path, "aravis", loopback, names=["K2"])
     config = CameraConfig(
         name="K2", address=rig.cameras[0].address, scenario=SCENARIO, rate_hz=rig.trigger.rate_hz, epoch=host_now(),
-        test_pattern=True, ptp_offset_ns=0, maker=maker,
+        test_pattern=True, ptp_offset_ns=0, maker=maker, **options,
     )  # fmt: skip
     camera, ring = Camera(config), CameraRing.create("K2", rig.cameras[0].frame_bytes, 16)
     camera.start()

@@ -69,6 +69,16 @@ def test_a_delay_in_microseconds_or_none_for_a_camera_alone(
             assert made.registers.number("GevSCPD") == ticks
 
 
+def test_a_delay_is_in_ticks_of_the_clock_also_where_the_description_does_not_tell_them(
+    tmp_path: Path, loopback: Loopback, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialect = replace(DIALECTS[Maker.STANDARD], without=frozenset({"GevTimestampTickFrequency"}))
+    monkeypatch.setitem(DIALECTS, Maker.STANDARD, dialect)
+    with make(Maker.STANDARD, tmp_path, loopback, tick_hz=125_000_000) as made, made.opened(wire=THREE) as camera:
+        assert made.registers.number("GevSCPD") == 18_076
+        assert camera.description.endswith(", 8.0 ms to send a frame")
+
+
 def test_a_frame_that_the_port_cannot_carry_from_pulse_to_pulse_is_refused(tmp_path: Path, loopback: Loopback) -> None:
     told = r"needs 267.5 ms to send a frame \(speed of the port\), and pulses come every 33.3 ms: choose a smaller"
     with (

@@ -175,7 +175,13 @@ def test_clock_reset(make_camera: MakeCamera) -> None:
 def settle(receiver: Receiver) -> None:
     """Switch PTP on and wait until the camera follows the master."""
     receiver.device.set_boolean_feature_value("PtpEnable", True)
-    wait_until(lambda: receiver.device.get_string_feature_value("PtpStatus") == "Slave", "PTP has settled")
+    assert receiver.device.get_string_feature_value("PtpStatus") == "Disabled", "it is that of the last latch"
+
+    def settled() -> bool:
+        receiver.device.execute_command("PtpDataSetLatch")
+        return str(receiver.device.get_string_feature_value("PtpStatus")) == "Slave"
+
+    wait_until(settled, "PTP has settled")
 
 
 def test_ptp_brings_two_clocks_together(make_camera: MakeCamera) -> None:

@@ -73,3 +73,11 @@ def test_what_limits_a_camera_and_the_steps_of_its_gain_are_said(tmp_path: Path,
     assert "its gain has no unit (GainRaw, 0 to 500)" in findings[2].what
     assert "it takes 21.5 frames per second at most (ResultingFrameRateAbs), and 30 pulses come" in findings[3].what
     assert findings[4].what == "K2 has its gain in steps: gain_raw goes from 0 to 500"
+
+
+def test_a_camera_that_cannot_describe_itself_is_said_to_answer(tmp_path: Path, loopback: Loopback) -> None:
+    with make(Maker.STANDARD, tmp_path, loopback) as made:
+        made.registers._documents = {place: b"?" * len(text) for place, text in made.registers._documents.items()}
+        (refused,) = _try(made)
+    assert refused.what == "would be refused: K2 answers, but its description of itself cannot be read"
+    assert refused.remedy == "update its firmware, or use another camera"

@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help demo run bench corpus test test-long check style wheel lowest bundle install rollback uninstall lock tools client-tool docs clean setup system
+.PHONY: help demo run bench corpus test test-long check style wheel lowest bundle install rollback uninstall lock tools client-tool readers docs clean setup system
 
 # Some environments forbid Python to keep what it compiled: then each of the thousands of processes of the tests, and each
 # call of pytest, would compile the program anew.
@@ -83,11 +83,16 @@ lock: ## choose the newest allowed versions again: make lock ARGS=--upgrade
 	@build/uv/bin/uv pip compile .ci/docs/requirements.in --python-version 3.11 --quiet --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --output-file .ci/docs/requirements.lock $(ARGS)
 
-tools: setup $(NPM) $(DOCS) client-tool ## all that CI fetches from the network, best at the same time (-j4)
+tools: setup $(NPM) $(DOCS) client-tool readers ## all that CI fetches from the network, best at the same time (-j4)
 
 client-tool: system ## for the test that makes a client of the REST API: openapi-python-client, in an environment of its own
 	@test -x build/client-tool/bin/openapi-python-client || { /usr/bin/python3 -m venv build/client-tool && \
 	  build/client-tool/bin/pip install -qq openapi-python-client; }
+
+readers: setup ## for the test that has exported calibrations read by the programs that they are for, beside Svev's environment
+	@test -e build/readers/.complete || { $(PIP) install -qq --no-deps --upgrade --target build/readers pycolmap==4.2.1 caliscope==0.11.8 \
+	  Pose2Sim==0.10.49 anytree rtoml platformdirs matplotlib contourpy cycler fonttools kiwisolver packaging pyparsing && \
+	  touch build/readers/.complete; }
 
 docs: setup $(DOCS) ## the documentation as a site in build/site, with search; a link that leads nowhere is an error
 	@$(BIN)/python -m tests.support.rest_description build/docs/openapi.json

@@ -13,7 +13,7 @@ from photogrammetry.exchange.part import Part, joined
 from photogrammetry.exchange.photomodeler import read_photomodeler
 from photogrammetry.exchange.table import ENDINGS
 from photogrammetry.exchange.vision.camera_toml import read_camera_toml
-from photogrammetry.exchange.vision.colmap import FILES, read_colmap
+from photogrammetry.exchange.vision.colmap import FILES, FRAMES, read_colmap
 from photogrammetry.exchange.vision.opencv import read_opencv
 from photogrammetry.network.calibration_file import read_calibration
 from photogrammetry.network.file import network_from_json
@@ -65,7 +65,7 @@ def _parts(files: Sequence[Path], sigma: float, sigma_mm: float | None) -> Itera
             models.setdefault(folder, {}).update(inside)
         elif path.name in FILES:
             models.setdefault(folder, {})[path.name] = path
-        else:
+        elif path.name not in FRAMES:
             yield _part(path, sigma, sigma_mm)
     for model in models.values():
         yield read_colmap(model, sigma)

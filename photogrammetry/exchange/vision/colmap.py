@@ -19,7 +19,10 @@ from rig.errors import BadInputError
 from rig.settings.strict_toml import read_text
 
 _PARTS: Final = ("cameras", "images", "points3D")
-FILES: Final = tuple(part + ending for part in _PARTS for ending in (".txt", ".bin"))
+_ENDINGS: Final = (".txt", ".bin")
+FILES: Final = tuple(part + ending for part in _PARTS for ending in _ENDINGS)
+#: Since COLMAP 3.12: which cameras stand together, of which every image has its pose all the same.
+FRAMES: Final = tuple(part + ending for part in ("rigs", "frames") for ending in _ENDINGS)
 _CORNER: Final = 0.5  # px, from COLMAP's origin to the centre of the first pixel
 #: Models that can be carried over: number of focal lengths, and what the parameters after cx, cy are.
 _MODELS: Final[Mapping[str, tuple[int, tuple[str, ...]]]] = {

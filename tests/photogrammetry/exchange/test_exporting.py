@@ -1,7 +1,10 @@
 """Cameras and poses go out to other programs and come back as they were: image points equal to 1e-9 px."""
 
 import json
+import os
 import struct
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -20,6 +23,8 @@ from rig.arrays import Floats
 from rig.errors import BadInputError
 from svev import cli
 
+#: COLMAP, Pose2Sim and caliscope without what else they want, so that they change nothing in Svev's environment.
+_READERS = Path(__file__).parents[3] / "build" / "readers"
 #: Distortions that OpenCV's parameters describe exactly: none, all terms, balanced, affinity alone.
 EXACT: dict[str, dict[str, float]] = {
     "ideal": {},
@@ -144,24 +149,27 @@ def test_the_toml_is_what_anipose_and_pose2sim_read(tmp_path: Path) -> None:
         assert np.abs(seen - views_of(network)[table["name"]].project(XYZ)).max() < 1e-9
 
 
-def test_pycolmap_reads_the_model_and_its_binary_files_come_in(tmp_path: Path) -> None:
-    pycolmap = pytest.importorskip("pycolmap", reason="pycolmap is not installed")
-    network = network_from_json(_network(**EXACT["all terms"]), "network")
-    _written(network, Form.COLMAP, tmp_path)
-    model = pycolmap.Reconstruction(str(tmp_path))
-    for image in model.images.values():
-        expected = views_of(network)[image.name].project(XYZ)
-        seen = np.array([image.project_point(xyz) for xyz in XYZ])
-        assert np.abs(seen - 0.5 - expected).max() < 1e-9
-    (tmp_path / "binary").mkdir()
-    model.write_binary(str(tmp_path / "binary"))
-    for extra in {path.name for path in (tmp_path / "binary").iterdir()} - {
-        "cameras.bin",
-        "images.bin",
-        "points3D.bin",
-    }:
-        (tmp_path / "binary" / extra).unlink()
-    assert _apart(network, import_network([tmp_path / "binary"]).network) < 1e-9
+@pytest.mark.skipif(not _READERS.exists(), reason="programs that read our files are not there: make readers")
+def test_programs_of_others_project_the_same(tmp_path: Path) -> None:
+    """COLMAP's own model, which it has written again as text and binary, comes in with all of its files."""
+    network = network_from_json(_network(**EXACT["balanced"]), "network")
+    for form in (Form.COLMAP, Form.TOML):
+        (tmp_path / form).mkdir()
+        _written(network, form, tmp_path / form)
+    (tmp_path / "points.json").write_text(json.dumps(XYZ.tolist()))
+    command = [sys.executable, "-P", str(Path(__file__).with_name("read_by_others.py")), str(tmp_path)]
+    environment = {**os.environ, "PYTHONPATH": str(_READERS)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=True)
+    seen = json.loads(done.stdout.splitlines()[-1])
+    assert set(seen) == {"pycolmap", "Pose2Sim", "caliscope"}
+    for cameras in seen.values():
+        for view, image_points in zip(views_of(network).values(), cameras, strict=True):
+            assert np.abs(np.array(image_points) - view.project(XYZ)).max() < 1e-9
+    for kind in ("bin", "txt"):
+        folder = tmp_path / kind
+        assert (folder / f"frames.{kind}").exists()
+        for files in ([folder], sorted(folder.iterdir())):
+            assert _apart(network, import_network(files).network) < 1e-9
 
 
 def _binary(folder: Path) -> None:

@@ -123,9 +123,10 @@ def test_one_module_starts_programs_of_ours_and_leaves_the_present_folder_out() 
 
 @pytest.fixture
 def shadowed(tmp_path: Path) -> Path:
-    """A folder with a file of each of our names, none of which can be imported."""
-    for package in PACKAGES:
-        (tmp_path / f"{package}.py").write_text(f'raise SystemExit("{package}.py of the user was imported")\n')
+    """A folder with a file of each name that we import, ours and others', none of which can be imported."""
+    for name in {*PACKAGES, *sys.stdlib_module_names, *metadata.packages_distributions()}:
+        if name.isidentifier():
+            (tmp_path / f"{name}.py").write_text(f'raise SystemExit("{name}.py of the user was imported")\n')
     return tmp_path
 
 

@@ -28,6 +28,7 @@ _CONNECT_S: Final = 10.0
 _LOOK_S: Final = 2.0
 _PATIENCE: Final = 60
 _LOCAL: Final = "127.0.0.1"
+_SAFE_PATH: Final = "PYTHONSAFEPATH"
 #: Results are on the disk: nothing is kept in a worker's memory that it could move there or wait for.
 _CONFIGURED: Final = {
     "distributed.scheduler.allowed-failures": 0,
@@ -90,6 +91,7 @@ def engine(cluster: Cluster, dashboard: str) -> Iterator[Engine]:
         if cluster.scheduler is None:
             count = cluster.workers or len(os.sched_getaffinity(0))
             with (
+                _away_from_the_present_folder(),
                 LocalCluster(
                     host=_LOCAL, n_workers=count, threads_per_worker=1, memory_limit=cluster.memory_bytes,
                     dashboard_address=dashboard, silence_logs=logging.CRITICAL,
@@ -110,6 +112,23 @@ def engine(cluster: Cluster, dashboard: str) -> Iterator[Engine]:
                     f"{cluster.scheduler}: has no workers; start some by `dask worker {cluster.scheduler}`"
                 )
             yield Engine(client, client.dashboard_link, lambda: None)
+
+
+@contextmanager
+def _away_from_the_present_folder() -> Iterator[None]:
+    """Python processes that begin meanwhile import nothing from the present folder, where users have files of any name.
+
+    Those of `multiprocessing` begin by `python -c`, which looks there first.
+    """
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
 
 
 def run_tasks(on: Engine, function: Callable[..., Any], arguments: Mapping[str, Any], hearer: Hearer) -> None:

@@ -44,6 +44,21 @@ def test_a_task_that_kills_two_workers_is_set_aside_and_no_other_is_accused(tmp_
     assert all(runs(tmp_path / name) <= 3 for name in names)  # beside one that killed its worker: again, alone
 
 
+def test_workers_start_beside_files_of_the_names_of_modules(tmp_path: Path) -> None:
+    user, program = tmp_path / "user", tmp_path / "bin" / "program.py"
+    for folder in (user, program.parent, tmp_path / "done"):
+        folder.mkdir()
+    for name in ("multiprocessing", "signal", "random", "rig", "numpy", "season"):
+        (user / f"{name}.py").write_text(f'raise SystemExit("{name}.py of the user was imported")\n')
+    call = f"main({str(tmp_path / 'done')!r}, ['one', 'two'])"
+    program.write_text(f'from tests.season.tiny_tasks import main\nif __name__ == "__main__":\n    {call}\n')
+    done = subprocess.run(
+        [sys.executable, str(program)], cwd=user, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert "was imported" not in done.stderr
+    assert json.loads(done.stdout.splitlines()[-1])["ended"] == {"one": "done", "two": "done"}
+
+
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, loopback: Loopback) -> None:
     log_file(tmp_path / "hill" / "a.mcap")
     address = f"tcp://{loopback.host}:{loopback.free_port()}"

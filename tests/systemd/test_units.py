@@ -57,7 +57,10 @@ def test_users_and_directories_are_understood(prefix: Path, tmp_path: Path) -> N
     assert members["video"].endswith(":svev")
     assert members["dialout"].endswith(":svev")
     assert members["gpio"].endswith(":svev")
-    described = _run("systemd-tmpfiles", "--cat-config", f"--root={prefix}", prefix / "lib/tmpfiles.d/svev.conf")
+    configured = root / "usr/lib/tmpfiles.d"
+    configured.mkdir(parents=True)
+    shutil.copy(prefix / "lib/tmpfiles.d/svev.conf", configured)
+    described = _run("systemd-tmpfiles", "--cat-config", f"--root={root}")
     assert "/var/lib/svev/recordings" in described
 
 

@@ -27,6 +27,7 @@ from bench.recording.parts import run_parts
 from bench.results import write_results
 from bench.service.api import run_api
 from bench.service.catalogue import run_catalogue
+from bench.service.finding import run_finding
 from bench.service.listing import run_listing
 from bench.service.training import run_trainings
 from bench.triggering.pairing import pairing_table, run_pairing
@@ -198,6 +199,7 @@ SUITES: dict[str, Suite] = {
     "parts": _parts,
     "api": _api,
     "catalogue": lambda seconds, directory: _timed("catalogue", lambda _: run_catalogue(directory), seconds, directory),
+    "finding": lambda seconds, directory: _timed("finding", lambda _: run_finding(directory), seconds, directory),
     "listing": lambda seconds, directory: _timed("listing", lambda _: run_listing(directory), seconds, directory),
     "adjustment": partial(_timed, "adjustment", run_adjustment),
     "intersection": _intersection,

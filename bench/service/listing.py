@@ -90,18 +90,22 @@ def _write_logs(folder: Path) -> None:
 
 def _keep_jump(log: Path, number: int) -> None:
     """Keep main figures beside a log, of a jump on its day."""
+    made = log.parent / "made"
+    made.mkdir()
+    keep_result(made, log, (some_jump(log, number),))
+
+
+def some_jump(log: Path, number: int) -> LastJump:
+    """Main figures of a jump on its day."""
     days, minutes = divmod(number, _A_DAY)
     figures = {
         name: MeasuredValue(value=25 + number % 7, sigma=0.05)
         for name in ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body")
     }
-    jump = LastJump(
+    return LastJump(
         recording=log.stem, jump=1, time=_FIRST_DAY + timedelta(days=days, minutes=minutes), ok=True,
         verdict="measured well: all points in 35 of 35 pulses", **figures,
     )  # fmt: skip
-    made = log.parent / "made"
-    made.mkdir()
-    keep_result(made, log, (jump,))
 
 
 def _measure(folder: Path, name: str, paths: tuple[str, ...]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from recorder.log.session_changes import session_changes
 from recorder.reading.info import LogInfo, info
 from recorder.reading.log_reader import ForeignFileError
 from recorder.reading.records import link_text
+from rig.api.fields import LONGEST_TAG
 from rig.clocks import UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
@@ -64,6 +65,7 @@ class Entry:
         cameras: names, left to right.
         shape: rows and columns of the triplets, None if there is no pulse.
         session: the session's fields, with later changes applied.
+        rig: name of the rig, as its file has it: as a rule the hill.
         disk: frames that were lost because of the disk; empty text: none.
         forgotten_s: after so many seconds it ended by itself, because nobody had stopped it; 0: otherwise.
         ended_early: why it ends before the recording was to end, or that this is not known; empty text: as was wanted.
@@ -87,6 +89,7 @@ class Entry:
     cameras: tuple[str, ...] = ()
     shape: tuple[int, int] | None = None
     session: Mapping[str, str] = field(default_factory=dict)
+    rig: str = ""
     disk: Phrase = NOTHING
     forgotten_s: float = 0.0
     ended_early: Phrase = NOTHING
@@ -97,6 +100,21 @@ class Entry:
     def partial(self) -> int:
         """Pulses that not every camera delivered."""
         return self.pulses - self.complete
+
+    @property
+    def time(self) -> UtcNs:
+        """By which it is sorted: of the first pulse, otherwise when the file was last written."""
+        return self.modified if self.started is None else self.started
+
+    @property
+    def tags(self) -> tuple[str, ...]:
+        """The tags that people gave to it."""
+        return tuple(filter(None, (tag.strip()[:LONGEST_TAG] for tag in self.session.get("tags", "").split(","))))
+
+    @property
+    def favourite(self) -> bool:
+        """Whether it is marked as a favourite."""
+        return bool(self.session.get("favourite"))
 
 
 def read_entry(path: Path) -> Entry:
@@ -127,7 +145,7 @@ def read_entry(path: Path) -> Entry:
         started=ledger.first_time, duration_s=ledger.duration_s,
         pulses=ledger.pulses, complete=ledger.complete, missing=found.missing_pulses,
         causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
-        cameras=found.cameras, shape=found.shape, session=found.session,
+        cameras=found.cameras, shape=found.shape, session=found.session, rig=found.rig.get("name", ""),
         disk=found.disk, forgotten_s=found.forgotten_s, ended_early=found.ended_early_said,
     )  # fmt: skip
 

@@ -7,17 +7,19 @@ it, when they are old, or when the disk needs their room.
 import os
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recorder.catalogue.entry import SUFFIX, Entry
-from recorder.catalogue.log_cache import LogCache
+from recorder.catalogue.image_places import ImagePlaces
+from recorder.catalogue.log_index import Judge, LogIndex, NoJudge
 from recorder.catalogue.trash import (
     TrashContents,
     TrashedLog,
@@ -34,6 +36,8 @@ from recorder.log.write_lock import is_being_written
 from recorder.reading.log_reader import LogReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
+from rig.api.athletes import JumpQuery
+from rig.api.recordings import RecordingQuery
 from rig.errors import LogDamagedError, StillRecordingError, StorageError, UnknownRecordingError
 from rig.host.file_names import ID_BYTES_MAX, give_name, is_recording_id
 from rig.host.files import make_folder, opened_folder
@@ -46,6 +50,19 @@ _STEM_MAX: Final = 90
 _NUMBER_MAX: Final = 10
 
 
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a query finds.
+
+    Attributes:
+        total: how many recordings fit, on all pages.
+        entries: those of the page that was asked for, in its order.
+    """
+
+    total: int
+    entries: Sequence[Entry]
+
+
 class Catalogue:
     """All recordings of a folder, those in its trash included. Methods may be called from any thread.
 
@@ -54,13 +71,21 @@ class Catalogue:
 
     Attributes:
         directory: the folder.
+
+    Args:
+        directory: the folder.
+        judge: knows of a log what is not the recorder's; None: verdicts and measured jumps are not searched for.
     """
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, judge: Judge | None = None) -> None:
         self.directory = directory
         self._trash = trash_of(directory)
-        self._logs = LogCache(directory)
+        self._logs, self._places = LogIndex(directory, judge or NoJudge()), ImagePlaces()
         self._changing = threading.Lock()
+
+    def close(self) -> None:
+        """Close the catalogue's file."""
+        self._logs.close()
 
     def entries(self, *, deleted: bool = False) -> list[Entry]:
         """The recordings, newest first; those in the trash if `deleted`.
@@ -68,19 +93,41 @@ class Catalogue:
         Raises:
             StorageError: the folder cannot be read.
         """
-        folder = self._folder(deleted=deleted)
-        try:
-            if deleted:
+        return list(self.find(RecordingQuery(deleted=deleted)).entries)
+
+    def find(self, query: RecordingQuery) -> Found:
+        """The recordings that a query finds.
+
+        Raises:
+            BadInputError: its text cannot be understood.
+            StorageError: the folder cannot be read.
+        """
+        with self._reading(self._folder(deleted=query.deleted)):
+            if query.deleted:
                 self._check_trash()
-            found = self._logs.entries(folder)
-        except FileNotFoundError:
-            return []
-        except OSError as error:
-            raise StorageError(
-                f"{folder}: cannot be read ({error.strerror}); check the folder's permissions"
-            ) from error
-        self._logs.save()
-        return sorted(found, key=lambda entry: (entry.started or entry.modified, entry.id), reverse=True)
+            return Found(*self._logs.find(query))
+        return Found(0, ())
+
+    def jumps(self, query: JumpQuery, columns: str) -> Sequence[tuple[Any, ...]]:
+        """Columns, in SQL, of the measured jumps that a query finds, newest first; none that lies in the trash.
+
+        Raises:
+            BadInputError: its text cannot be understood.
+            StorageError: the folder cannot be read.
+        """
+        with self._reading(self.directory):
+            return self._logs.jumps(query, columns)
+        return ()
+
+    def following(self, ids: Sequence[str], *, deleted: bool = False) -> Mapping[str, str]:
+        """Which recordings go on with which of these: ids by ids.
+
+        Raises:
+            StorageError: the folder cannot be read.
+        """
+        with self._reading(self._folder(deleted=deleted)):
+            return self._logs.following(ids, deleted=deleted)
+        return {}
 
     def entry(self, recording: str, *, prefer_deleted: bool = False) -> Entry:
         """One recording, in the folder or in its trash; `prefer_deleted`: if both hold the id, that in the trash.
@@ -126,7 +173,7 @@ class Catalogue:
         """
         path = self._path(recording)
         with LogReader(path, skim=True, links=False) as reader:
-            place = self._logs.image_places(reader, pulse).get(PulseNumber(pulse))
+            place = self._places.of(reader, pulse).get(PulseNumber(pulse))
             if place is None:
                 raise UnknownRecordingError(
                     phrase(
@@ -298,6 +345,18 @@ class Catalogue:
                     f"{error.filename or self.directory}: cannot be changed ({error.strerror}); check the folder's "
                     "permissions and the room on its disk"
                 ) from error
+
+    @contextmanager
+    def _reading(self, folder: Path) -> Iterator[None]:
+        """Make a StorageError of a folder that cannot be read; one that is not there holds nothing."""
+        try:
+            yield
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise StorageError(
+                f"{folder}: cannot be read ({error.strerror}); check the folder's permissions"
+            ) from error
 
     def _folder(self, *, deleted: bool) -> Path:
         return self._trash if deleted else self.directory

@@ -34,6 +34,7 @@ class JumpQuery(Model):
     """Which measured jumps are wanted, newest first; those that fit everything that is given."""
 
     athlete: Line = ""
+    search: Line = ""
     since: AwareDatetime | None = None
     until: AwareDatetime | None = None
     limit: WholeNumber | None = None

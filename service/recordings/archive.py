@@ -21,7 +21,6 @@ from service.recordings.archive_notes import ArchiveNotes
 from service.recordings.archive_results import ArchiveResults
 from service.recordings.describing import Chain, as_pulses, as_recording
 from service.recordings.download import digitized_downloads, download_of, file_name, sha256_of, zipped, zipped_size
-from service.recordings.listing import find
 from service.recordings.measured_jumps import MeasuredJumps
 from service.seam.archive import Download, FoundRecordings
 
@@ -46,15 +45,13 @@ class Archive(ArchiveResults, ArchiveNotes):
         ArchiveNotes.__init__(self, catalogue)
         self.exports = exports
         self._checksums: dict[str, str] = {}
-        self._descriptions: dict[tuple[str, bool], tuple[Entry, Recording]] = {}
 
     def recordings(self, query: RecordingQuery = _ALL) -> FoundRecordings:
         """The recordings that a query finds, the one in progress among them."""
         current = self.status().recording
-        entries = self._catalogue.entries(deleted=query.deleted)
-        found = find(entries, query, lambda entry: self._described(entry).verdict.level)
-        chain = Chain(self._catalogue, entries)
-        shown = [chain.pointing_on(self._described(entry)) for entry in found.entries]
+        found = self._catalogue.find(query)
+        chain = Chain(self._catalogue, found.entries)
+        shown = [chain.pointing_on(as_recording(entry)) for entry in found.entries]
         return FoundRecordings(found.total, [current if current and each.id == current.id else each for each in shown])
 
     def recording(self, recording_id: str) -> Recording:
@@ -66,15 +63,7 @@ class Archive(ArchiveResults, ArchiveNotes):
 
     def _with_next_part(self, entry: Entry) -> Recording:
         """Describe an entry, with the id of the recording that goes on with it."""
-        chain = Chain(self._catalogue, self._catalogue.entries(deleted=entry.deleted))
-        return chain.pointing_on(as_recording(entry))
-
-    def _described(self, entry: Entry) -> Recording:
-        """Describe an entry for the panel, unless that was done before: the catalogue gives the same object then."""
-        known = self._descriptions.get((entry.id, entry.deleted))
-        if known is None or known[0] is not entry:
-            known = self._descriptions[entry.id, entry.deleted] = entry, as_recording(entry)
-        return known[1]
+        return Chain(self._catalogue, [entry]).pointing_on(as_recording(entry))
 
     def trash(self) -> Trash:
         """How much lies in the trash."""

@@ -17,7 +17,7 @@ from service.comparing.asking import Comparisons
 from service.measuring.queue import Measurings
 from service.measuring.results import is_outdated, jumps_in_full, result_file
 from service.recordings import live_results
-from service.recordings.measured_jumps import MeasuredJumps, athletes, wanted
+from service.recordings.measured_jumps import MeasuredJumps, athletes
 
 
 class ArchiveResults(ABC):
@@ -54,11 +54,11 @@ class ArchiveResults(ABC):
 
     def athletes(self) -> list[Athlete]:
         """Whose jumps were measured, by name."""
-        return athletes(self._jumps.all())
+        return athletes(self._jumps.find(JumpQuery()))
 
     def measured_jumps(self, query: JumpQuery) -> list[AthleteJump]:
         """The measured jumps that a query finds, newest first; none that lies in the trash."""
-        return wanted(self._jumps.all(), query)
+        return self._jumps.find(query)
 
     def compare_spans(self, athlete: str, first: Span, second: Span) -> Comparison:
         """Whether an athlete's jumps of two spans of time differ by more than chance.

@@ -11,7 +11,7 @@ from rig.api.statement import Level, Statement
 from rig.clocks import NS_PER_S
 from rig.errors import UnknownRecordingError
 from rig.tag import TripletTag
-from service.recordings.listing import is_favourite, more_of, tags_of, utc
+from service.recordings.listing import more_of, utc
 from service.recordings.verdicts import LONGEST_SHOWN, verdict
 
 _STATES = {
@@ -37,8 +37,8 @@ def as_recording(entry: Entry) -> Recording:
         session=SessionFields.model_construct(None, **known),  # unchecked: old logs may hold what is refused today
         verdict=verdict(entry),
         deleted=entry.deleted,
-        favourite=is_favourite(entry),
-        tags=tags_of(entry),
+        favourite=entry.favourite,
+        tags=entry.tags,
         more=more_of(entry.session),
         continues=entry.session.get(CONTINUES, "")[:LONGEST_SHOWN],
     )
@@ -49,13 +49,14 @@ class Chain:
 
     Args:
         catalogue: of the folder.
-        entries: those of it, or those of its trash.
+        entries: some of it, or some of its trash.
     """
 
     def __init__(self, catalogue: Catalogue, entries: Sequence[Entry]) -> None:
         self._catalogue = catalogue
         self._ids = {entry.id for entry in entries}
-        self._following = {entry.session[CONTINUES]: entry.id for entry in entries if CONTINUES in entry.session}
+        deleted = any(entry.deleted for entry in entries)
+        self._following = catalogue.following([entry.id for entry in entries], deleted=deleted)
 
     def pointing_on(self, recording: Recording) -> Recording:
         """A recording with the id of its next part, if it has one; its verdict says if the part before is gone."""

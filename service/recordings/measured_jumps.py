@@ -1,67 +1,62 @@
-"""The measured jumps of all recordings of a folder, by athlete; results are read again only if they are others."""
+"""The measured jumps of all recordings of a folder, and what the catalogue asks about each log."""
 
-import os
-import threading
-from collections.abc import Iterable
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
 from analysis.report.kinogram.earlier import NAME as KINOGRAM
 from recorder.catalogue.entry import SUFFIX, Entry
 from recorder.catalogue.folder import Catalogue
-from recorder.catalogue.index_file import FileKey, file_key
-from recorder.log.jumper_path import jumper_path
+from recorder.catalogue.log_index import FoundJump
 from recorder.log.measured_path import measured_path
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery, folded
 from rig.api.jump import LastJump
 from rig.api.statement import Level
-from service.measuring.outcome import outcome_path
+from rig.errors import UnknownRecordingError
+from rig.transport import wire
 from service.measuring.results import jumps_of
 from service.recordings.live_results import summaries
+from service.recordings.verdicts import verdict
 
 #: What is repeated of a session field, however long the log has it.
 _LONGEST_SHOWN: Final = 200
+_SESSION: Final = wire.decoder(dict[str, str])
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """What was read beside a log, and of whom it was said to be then.
+class LogJudge:
+    """Tells the catalogue of the verdict on a log and of the jumps that were measured in it."""
 
-    Attributes:
-        files: that of the whole log's result, and that of live results.
-        keys: of these files.
-        entry: the recording.
-        jumps: its jumps.
-    """
+    def level(self, entry: Entry) -> Level:
+        """How grave the verdict is."""
+        return verdict(entry).level
 
-    files: tuple[str, str]
-    keys: tuple[FileKey | None, FileKey | None]
-    entry: Entry
-    jumps: tuple[AthleteJump, ...]
+    def jumps(self, log: Path) -> Sequence[FoundJump]:
+        """Those of the whole log; if it was not measured, those that were measured live."""
+        whole = jumps_of(log)
+        return [FoundJump(jump, live=not whole) for jump in whole or summaries(log)]
 
 
 class MeasuredJumps:
     """Any thread may call any method.
 
     Args:
-        catalogue: of the folder of the recordings.
+        catalogue: of the folder of the recordings, with a `LogJudge`.
     """
 
     def __init__(self, catalogue: Catalogue) -> None:
-        self._catalogue, self._directory = catalogue, catalogue.directory
-        self._known: dict[str, _Known] = {}
-        self._lock = threading.Lock()
+        self._catalogue = catalogue
 
-    def all(self) -> list[AthleteJump]:
-        """The measured jumps of the recordings that lie in the folder itself, not in the trash, newest first.
+    def find(self, query: JumpQuery) -> list[AthleteJump]:
+        """The measured jumps that a query finds, newest first; none that lies in the trash.
 
         Raises:
+            BadInputError: its text cannot be understood.
             StorageError: the folder cannot be read.
         """
-        jumps = [jump for each in self._look_at_all().values() for jump in each.jumps]
-        return sorted(jumps, key=lambda each: (each.jump.time, each.jump.recording, each.jump.jump), reverse=True)
+        rows = self._catalogue.jumps(query, "r.id, r.said, j.live, j.content")
+        return [
+            _of_athlete(recording, _SESSION.decode(said), content, live=live) for recording, said, live, content in rows
+        ]
 
     def others_of_athlete(self, recording: str) -> list[Path]:
         """The `kinogram.json` of the other measured logs of whoever jumps in a recording; none without a name.
@@ -69,46 +64,16 @@ class MeasuredJumps:
         Raises:
             StorageError: the folder cannot be read.
         """
-        known = self._look_at_all()
-        own = _athlete(known[recording].entry) if recording in known else ""
-        return [
-            measured_path(self._directory / f"{name}{SUFFIX}") / KINOGRAM
-            for name, each in known.items()
-            if own and name != recording and any(jump.level is not Level.INFO for jump in each.jumps)
-            if _athlete(each.entry) == own
-        ]
-
-    def _look_at_all(self) -> dict[str, _Known]:
-        with self._lock:
-            self._known = {entry.id: self._look(entry) for entry in self._catalogue.entries()}
-            return self._known
-
-    def _look(self, entry: Entry) -> _Known:
-        before, log = self._known.get(entry.id), self._directory / f"{entry.id}{SUFFIX}"
-        files = before.files if before is not None else (str(outcome_path(log)), str(jumper_path(log)))
-        keys = _key(files[0]), _key(files[1])
-        if before is not None and before.keys == keys:
-            if before.entry is entry:
-                return before
-            found = [(each.jump, each.level is Level.INFO) for each in before.jumps]
-        else:
-            whole = jumps_of(log) if keys[0] else ()
-            live = summaries(log) if keys[1] and not whole else ()
-            found = [*((jump, False) for jump in whole), *((jump, True) for jump in live)]
-        return _Known(files, keys, entry, tuple(_of_athlete(entry, jump, live=live) for jump, live in found))
-
-
-def wanted(jumps: Iterable[AthleteJump], query: JumpQuery) -> list[AthleteJump]:
-    """Those of the jumps that a query asks for, in their order."""
-    name = folded(query.athlete)
-    fitting = [
-        each
-        for each in jumps
-        if (not name or folded(each.athlete) == name)
-        and (query.since is None or each.jump.time >= query.since)
-        and (query.until is None or each.jump.time < query.until)
-    ]
-    return fitting[: query.limit]
+        try:
+            name = folded(self._catalogue.entry(recording).session.get("athlete", ""))
+        except UnknownRecordingError:  # removed meanwhile
+            return []
+        if not name:
+            return []
+        rows = self._catalogue.jumps(JumpQuery.model_construct(athlete=name), "r.id, j.live")
+        others = dict.fromkeys(other for other, live in rows if not live and other != recording)
+        folder = self._catalogue.directory
+        return [measured_path(folder / f"{other}{SUFFIX}") / KINOGRAM for other in others]
 
 
 def athletes(jumps: Iterable[AthleteJump]) -> list[Athlete]:
@@ -133,22 +98,10 @@ def athletes(jumps: Iterable[AthleteJump]) -> list[Athlete]:
     ]
 
 
-def _of_athlete(entry: Entry, jump: LastJump, *, live: bool) -> AthleteJump:
-    session = {name: text[:_LONGEST_SHOWN].strip() for name, text in entry.session.items()}
+def _of_athlete(recording: str, said: dict[str, str], content: bytes, *, live: bool) -> AthleteJump:
+    jump = LastJump.model_validate_json(content)
     return AthleteJump(
-        athlete=session.get("athlete", ""),
-        bib=session.get("bib", ""),
-        gate=session.get("gate", ""),
+        **{name: text[:_LONGEST_SHOWN].strip() for name, text in said.items()},
         level=Level.INFO if live else Level.GOOD if jump.ok else Level.WARNING,
-        jump=jump.model_copy(update={"recording": entry.id}),
+        jump=jump.model_copy(update={"recording": recording}),
     )
-
-
-def _athlete(entry: Entry) -> str:
-    return folded(entry.session.get("athlete", ""))
-
-
-def _key(path: str) -> FileKey | None:
-    with suppress(OSError):
-        return file_key(os.lstat(path))
-    return None

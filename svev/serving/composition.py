@@ -44,7 +44,7 @@ from service.measuring.queue import Measurings
 from service.offloading.releasing import Removal
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
-from service.recordings.measured_jumps import MeasuredJumps
+from service.recordings.measured_jumps import LogJudge, MeasuredJumps
 from service.recordings.steady_clock import SteadyClock
 from service.recordings.storage import usable_bytes
 from service.recordings.trash_keeper import TrashKeeper
@@ -121,7 +121,7 @@ def serve(settings: ServiceSettings) -> None:
         logging.basicConfig(level=logging.WARNING, handlers=[JournalHandler()])
         notify = stack.enter_context(closing(Notify()))
         slot = stack.enter_context(closing(PreviewSlot.create(rig.triplet_shape, len(rig.cameras))))
-        hub, catalogue = EventHub(write_line), Catalogue(data)
+        hub, catalogue = EventHub(write_line), stack.enter_context(closing(Catalogue(data, LogJudge())))
         jumps, options = MeasuredJumps(catalogue), RecorderOptions(directory=data, preroll_s=preroll_s, preview=slot.fd)
         jumpers = JumperBook(Keeper(data, hub.tell), hub.wake)
         supervisor = Supervisor(rig, rig_toml, hub, options, jumpers=jumpers)

@@ -6,7 +6,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -167,11 +167,11 @@ def keep_measured(log: Path, jumps: tuple[LastJump, ...]) -> None:
 
 
 @pytest.fixture
-def service(tmp_path: Path) -> MemoryService:
+def service(tmp_path: Path) -> Iterator[MemoryService]:
     """The rig: idle, no recordings. It shows three pictures a second: a browser draws each without a graphics card."""
-    rig = MemoryService(tmp_path)
-    rig.pulses_a_picture = 10
-    return rig
+    with closing(MemoryService(tmp_path)) as rig:
+        rig.pulses_a_picture = 10
+        yield rig
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 import json
 import ssl
 import subprocess
+from contextlib import closing
 from pathlib import Path
 
 import httpx
@@ -34,7 +35,10 @@ def test_clients_that_trust_the_ca_reach_the_panel(
 ) -> None:
     files = CertificateFiles.within(folder)
     access = Access.for_address(loopback.host, environment={"SVEV_TOKEN": TOKEN})
-    with serving(MemoryService(tmp_path), access, Tls.of(files.certificate, files.key)) as panel:
+    with (
+        closing(MemoryService(tmp_path)) as service,
+        serving(service, access, Tls.of(files.certificate, files.key)) as panel,
+    ):
         assert panel.url.startswith("https:")
         trust = ssl.create_default_context(cafile=files.authority)
         trust.verify_flags |= ssl.VERIFY_X509_STRICT

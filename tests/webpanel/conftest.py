@@ -1,6 +1,7 @@
 """A panel over a real socket, with a rig in memory."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import httpx
@@ -13,9 +14,10 @@ from webpanel.door.access import Access
 
 
 @pytest.fixture
-def service(tmp_path: Path) -> MemoryService:
+def service(tmp_path: Path) -> Iterator[MemoryService]:
     """The rig: idle, no recordings."""
-    return MemoryService(tmp_path)
+    with closing(MemoryService(tmp_path)) as rig:
+        yield rig
 
 
 @pytest.fixture

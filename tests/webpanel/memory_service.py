@@ -59,7 +59,7 @@ from service.measuring.queue import Measurings
 from service.offloading.releasing import Removal
 from service.recordings.archive import Archive
 from service.recordings.describing import as_recording
-from service.recordings.measured_jumps import MeasuredJumps
+from service.recordings.measured_jumps import LogJudge, MeasuredJumps
 from service.seam.cameras import CloseUp, Preview
 from service.supervision.situation import Moment, Phase
 from service.supervision.tap_guard import check_seen, check_stop, tap_guard
@@ -105,7 +105,7 @@ class MemoryService(Archive):
     """
 
     def __init__(self, folder: Path) -> None:
-        self.catalogue = Catalogue(folder)
+        self.catalogue = Catalogue(folder, LogJudge())
         self.settings = SIM
         jumps = MeasuredJumps(self.catalogue)
         self.measurings = Measurings(
@@ -151,6 +151,10 @@ class MemoryService(Archive):
         self._listeners: set[Callable[[], None]] = set()
         self._recording: Recording | None = None
         self._last: str | None = None
+
+    def close(self) -> None:
+        """Close the catalogue's file."""
+        self.catalogue.close()
 
     @property
     def listeners(self) -> int:

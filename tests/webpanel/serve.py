@@ -3,6 +3,7 @@
 import argparse
 import socket
 import tempfile
+from contextlib import closing
 from pathlib import Path
 
 from rig.frame import FrameStatus
@@ -20,8 +21,11 @@ def main() -> None:
     parser.add_argument("--token-file", type=Path)
     options = parser.parse_args()
     access = Access.for_address(options.host, options.token_file)
-    with tempfile.TemporaryDirectory() as folder, socket.create_server((options.host, options.port)) as listener:
-        service = MemoryService(Path(folder))
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        socket.create_server((options.host, options.port)) as listener,
+        closing(MemoryService(Path(folder))) as service,
+    ):
         write_recording(Path(folder), "jump-1", (ALL_OK,) * 30, {"athlete": "Anna Berg", "bib": "17"})
         write_recording(Path(folder), "jump-2", ((FrameStatus.OK, FrameStatus.LOST, FrameStatus.OK), *(ALL_OK,) * 29))
         make_server(create_app(service, access)).run(sockets=[listener])

@@ -23,11 +23,12 @@ def _query(
     athlete: Annotated[
         str, Query(max_length=LONGEST_LINE, description="the whole name; case and spaces do not matter")
     ] = "",
+    search: Annotated[str, Query(max_length=LONGEST_LINE, description="words and conditions, as for recordings")] = "",
     since: Annotated[Moment | None, Query(description="taken off at this time or later, with its zone")] = None,
     until: Annotated[Moment | None, Query(description="taken off before this time, with its zone")] = None,
     limit: Annotated[int | None, Query(ge=1, le=100_000, description="at most so many; all if left out")] = None,
 ) -> JumpQuery:
-    return JumpQuery.model_construct(athlete=athlete, since=since, until=until, limit=limit)
+    return JumpQuery.model_construct(athlete=athlete, search=search, since=since, until=until, limit=limit)
 
 
 def athletes_router(service: RigService) -> APIRouter:
@@ -39,7 +40,7 @@ def athletes_router(service: RigService) -> APIRouter:
         """Everybody of whom jumps were measured, by name. Names that differ in case or spaces only are one athlete."""
         return compressed(request, _ATHLETES.dump_json(service.athletes()))
 
-    @router.get("/jumps", response_model=list[AthleteJump])
+    @router.get("/jumps", response_model=list[AthleteJump], responses=refusals(422))
     def list_jumps(request: Request, query: Annotated[JumpQuery, Depends(_query)]) -> Response:
         """The measured jumps of all recordings that fit everything that is given, newest first; all if nothing is.
 

@@ -55,7 +55,12 @@ def _query(
     *,
     deleted: Annotated[bool, Query(description="those in the trash instead")] = False,
     search: Annotated[
-        str, Query(max_length=LONGEST_LINE, description="words in id, bib, athlete, gate, notes or tags; all of them")
+        str,
+        Query(
+            max_length=LONGEST_LINE,
+            description="words in the id or any text of the session, and conditions such as `alpha > 48`; all of them",
+            examples=["berg date:2026-11-21 alpha > 48"],
+        ),
     ] = "",
     athlete: Annotated[str, Query(max_length=LONGEST_LINE, description="part of the athlete's name")] = "",
     bib: Annotated[str, Query(max_length=LONGEST_LINE, description="the bib, exactly")] = "",

@@ -45,9 +45,10 @@ def bench(
     the simulated cameras. firewire: the same on an emulated FireWire bus. cameras-8, hertz-200: eight cameras 640 x 480
     at 30 Hz, three at 200 Hz: frames expected, complete and lost, processor time of each process, and bytes to the
     disk. parts: pairing, composing, checksum and drawing, each alone. api: answer times of the service while it records
-    at 30 Hz; the baseline is the idle service. catalogue, listing: lists of many recordings and jumps, and what pages
-    of jumps ask for; the baseline is a service that has just been started. intersection, planning: intersections of
-    rays and planned networks. adjustment: free networks with full covariance; the baseline is scipy's least_squares.
+    at 30 Hz; the baseline is the idle service. catalogue, listing, finding: lists of many recordings and jumps, what
+    pages of jumps ask for, searches among 20 000; the baseline is a service that has just been started. intersection,
+    planning: intersections of rays and planned networks. adjustment: free networks with full covariance; the baseline
+    is scipy's least_squares.
     jumps, jump-faults: rendered jumps are measured, without and with faults. jump-honesty: the same with many drawn
     surveys, errors beside their sigmas. jump-repeats: one jump filmed again and again, and with another leg angle: how
     often comparisons find a difference; about seven seconds a draw. live: how soon a worker tells the state of each

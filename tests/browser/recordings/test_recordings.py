@@ -12,9 +12,10 @@ import pytest
 from playwright.sync_api import expect
 
 from recorder.reading.corrected_log import corrected_log
+from rig.api.jump import MeasuredValue
 from rig.frame import FrameStatus
 from service.measuring.keeping import keep_result
-from tests.browser.conftest import MEASURED, Open, write_kinogram
+from tests.browser.conftest import MEASURED, Open, keep_measured, write_kinogram
 from tests.browser.views import assert_fits_a_phone, enter
 from tests.recorder.logs import ALL_OK
 from tests.support.waiting import wait_until
@@ -160,6 +161,36 @@ def test_marks_and_filters(panel: Panel, open_page: Open) -> None:
     page.get_by_label("From day").fill("2099-01-01")
     expect(page.locator("#recordings-empty")).to_have_text("No jump fits this search and these filters.")
     expect(page.locator("#filters-toggle")).to_have_text("Filter (1)")
+
+
+def test_conditions_are_added_shown_and_taken_away_on_a_phone(
+    panel: Panel, service: MemoryService, open_page: Open
+) -> None:
+    for name, alpha in (("low", 47.0), ("high", 49.0)):
+        log = write_recording(service.catalogue.directory, name, (ALL_OK,), {"athlete": "Anna Berg"})
+        angle = MeasuredValue(value=alpha, sigma=0.5)
+        keep_measured(log, (MEASURED.model_copy(update={"recording": name, "ski_to_body": angle}),))
+    page = open_page(f"{panel.url}/#/recordings", width=360, height=780)
+    rows, chips = page.locator("#recordings-list li a.summary"), page.locator("#recordings-chips button")
+    expect(rows).to_have_count(2)
+    expect(chips).to_have_count(0)
+    page.get_by_role("button", name="Filter").click()
+    page.get_by_label("Number").fill("48")
+    page.get_by_role("button", name="Add").click()
+    expect(page.get_by_role("searchbox")).to_have_value("alpha > 48")
+    expect(rows).to_have_count(1)
+    expect(rows).to_have_attribute("href", "#/recordings/high")
+    page.get_by_role("searchbox").fill("anna alpha > 46 date>2020")
+    expect(rows).to_have_count(2)
+    expect(chips).to_have_text([re.compile("^alpha > 46"), re.compile("^date>2020")])
+    page.get_by_role("searchbox").fill("anna alpha > 48 takeoff > 90")
+    expect(rows).to_have_count(0)
+    page.get_by_role("button", name="Search without takeoff > 90").click()
+    expect(rows).to_have_count(1)
+    expect(page.get_by_role("searchbox")).to_have_value("anna alpha > 48")
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    page.get_by_role("searchbox").fill("gamma > 3")
+    expect(page.get_by_text("gamma cannot be compared with a number")).to_be_visible()
 
 
 def test_a_jump_opens_at_its_take_off_is_played_slowly_in_a_loop_noted_and_exported(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from recorder.catalogue import log_cache
+from recorder.catalogue import log_index
 from recorder.catalogue.entry import LogState, read_entry, unlisted_logs
 from recorder.catalogue.folder import Catalogue
 from recorder.log.triplet_buffers import TripletBuffers
@@ -49,7 +49,7 @@ def _count_looks(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
         looks.append(path)
         return read_entry(path)
 
-    monkeypatch.setattr(log_cache, "read_entry", counting)
+    monkeypatch.setattr(log_index, "read_entry", counting)
     return looks
 
 
@@ -221,7 +221,7 @@ def test_session_fields_change_beside_the_log(folder: Path) -> None:
     assert Catalogue(folder).entry("jump").session == expected
     assert info(folder / "jump.mcap").session == expected
     assert (folder / "jump.mcap").read_bytes() == before
-    assert sorted(path.name for path in folder.iterdir()) == ["jump.mcap", "jump.session.json"]
+    assert sorted(path.name for path in folder.glob("[!.]*")) == ["jump.mcap", "jump.session.json"]
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"athlete": 3}', "null"])

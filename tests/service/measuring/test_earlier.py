@@ -12,7 +12,7 @@ from recorder.log.session_changes import write_session_changes
 from rig.api.jump import LastJump
 from service.measuring.keeping import keep_result
 from service.measuring.program import _earlier
-from service.recordings.measured_jumps import MeasuredJumps
+from service.recordings.measured_jumps import LogJudge, MeasuredJumps
 from tests.recorder.logs import ALL_OK, write_log
 
 TIME = datetime(2026, 2, 14, 10, 15, 30, tzinfo=UTC)
@@ -46,7 +46,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def _speeds(folder: Path, log: str = "fresh") -> list[float]:
-    files = MeasuredJumps(Catalogue(folder)).others_of_athlete(log)
+    files = MeasuredJumps(Catalogue(folder, LogJudge())).others_of_athlete(log)
     return sorted(jump.figures["takeoff_speed"].value for jump in _earlier(files))
 
 

@@ -27,7 +27,7 @@ from service.measuring.queue import Measurings
 from service.measuring.waiting import NAME
 from service.offloading.releasing import Removal
 from service.recordings import live_results
-from service.recordings.measured_jumps import MeasuredJumps
+from service.recordings.measured_jumps import LogJudge, MeasuredJumps
 from tests.analysis.simulated import training
 from tests.recorder.logs import write_log
 from tests.support.kept import kept_hill_log
@@ -72,7 +72,7 @@ class Bench:
         self.said: list[str] = []
         catalogue = Catalogue(folder)
         self.removal = Removal(catalogue.delete, lambda: catalogue.trash().bytes, lambda: True)
-        self.earlier: Callable[[str], list[Path]] = MeasuredJumps(Catalogue(folder)).others_of_athlete
+        self.earlier: Callable[[str], list[Path]] = MeasuredJumps(Catalogue(folder, LogJudge())).others_of_athlete
 
     @contextmanager
     def running(self) -> Iterator[Measurings]:

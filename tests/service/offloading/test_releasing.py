@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,9 @@ class Bench:
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:
     with other_disk() as other:
-        yield Bench(tmp_path, other)
+        made = Bench(tmp_path, other)
+        with closing(made.catalogue):
+            yield made
 
 
 def test_a_copy_on_the_same_disk_releases_nothing(tmp_path: Path) -> None:

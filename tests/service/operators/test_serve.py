@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from recorder.catalogue.index_file import NAME
+from recorder.catalogue.database import NAME
 from recorder.checking.verify import verify
 from recorder.reading.info import info
 from recorder.reading.log_reader import LogReader

@@ -23,7 +23,16 @@ def test_the_service_comes_up_beside_pipes_and_links_and_says_so(tmp_path: Path,
     data, dear = tmp_path / "data", tmp_path / "dear"
     data.mkdir()
     dear.write_text("dear")
-    for name in (NAME, FOLDER, REHEARSAL, ".svev-catalogue", "jump.mcap", "jump.jumper.json", "jump.session.json"):
+    for name in (
+        NAME,
+        FOLDER,
+        REHEARSAL,
+        ".svev-catalogue.db",
+        ".svev-catalogue.db-wal",
+        "jump.mcap",
+        "jump.jumper.json",
+        "jump.session.json",
+    ):
         os.mkfifo(data / name)
     (data / UNDO_NAME).symlink_to(dear)
     (data / "jump 10:30.mcap").touch()

@@ -188,3 +188,16 @@ def test_two_spans_are_compared_by_the_results_of_their_logs(client: httpx.Clien
     service.start_recording(RecordingOrder())
     said = refused(client.get("/api/jumps/comparison", params={"athlete": "ola", **spans}), 409)
     assert said.detail == "jumps are not compared while a recording runs: try again when it has ended"
+
+
+@pytest.mark.usefixtures("logs")
+def test_conditions_find_recordings_and_jumps_and_say_what_is_wrong_with_them(client: httpx.Client) -> None:
+    def ids(**query: str) -> list[str]:
+        return [each["id"] for each in client.get("/api/recordings", params=query).raise_for_status().json()]
+
+    assert _jumps(client, search='athlete:"ola nordmann" takeoff > 0') == _jumps(client, athlete="ola nordmann")
+    assert ids(search="takeoff > 0 ola") == ["b", "a"]
+    assert ids(search="takeoff > 900 ola") == []
+    for path in ("recordings", "jumps"):
+        answer = client.get(f"/api/{path}", params={"search": "gamma > 3"})
+        assert (answer.status_code, answer.json()["said"]["code"]) == (422, "search_quantity")

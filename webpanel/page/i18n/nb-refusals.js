@@ -123,5 +123,9 @@ export const refusals = {
   rate_replayed: ["pulsene er de i loggen som spilles av: spill av en logg med en annen takt"],
   rate_too_high: ["med {rate} Hz ville pulsene komme hvert {every}. ms, og eksponering og utlesing i kamera {camera} tar {busy} ms: velg en lavere takt, eller forkort eksponeringen først"],
   pulse_no_image: ["opptak {recording} har ikke noe bilde av puls {pulse}: velg en annen puls"],
+  search_value: ["{name}:{value} er ukjent: skriv en av {known}"],
+  search_number: ["{name}: {text} er ikke et tall: skriv for eksempel {name} > 48"],
+  search_date: ["datoen {text} forstås ikke: skriv 2026-11-21, 2026-11 eller 2026"],
+  search_quantity: ["{name} kan ikke sammenliknes med et tall: skriv > eller < bak en av {known}, eller sett ordene i anførselstegn"],
   voice_note_no_webm: ["dette er ingen WebM-fil: send det som en nettleser tar opp som audio/webm"],
 };

@@ -1,19 +1,33 @@
-/** What the list is narrowed down to, and its order: the search field and the panel of filters. */
+/** What the list is narrowed down to, and its order: the search field with its conditions, and the panel of filters. */
 
 import { t } from "../i18n/i18n.js";
-import { $, setText } from "../shared/dom.js";
+import { $, make, setText } from "../shared/dom.js";
 
 /** While somebody types, the service is not asked for every letter. */
 const PAUSE_MS = 200;
+/** A condition in the search field, as the service understands it: `alpha > 48`, `bib:17`, `note:"new boots"`. */
+const CONDITION = /[\p{L}][\w-]*(?:\s*(?:>=|<=|>|<)\s*|[:=])(?:"[^"]*"|[^\s">]\S*)/gu;
 const FIELDS = ["sort", "verdict", "tag", "since", "until"];
 
 /** @param {() => void} changed called when another list is wanted */
 export function startFilters(changed) {
   let timer = 0;
   const soon = () => { clearTimeout(timer); timer = setTimeout(changed, PAUSE_MS); };
-  $("recordings-search").addEventListener("input", soon);
+  const search = $("recordings-search");
+  const rewrite = (/** @type {string} */ text) => { search.value = text.trim(); drawFilters(); changed(); };
+  search.addEventListener("input", () => { drawFilters(); soon(); });
+  $("recordings-chips").addEventListener("click", (/** @type {Event} */ event) => {
+    const chip = /** @type {HTMLElement} */ (event.target).closest("button");
+    if (chip) rewrite(search.value.replace(chip.dataset.condition, " ").replace(/\s+/g, " "));
+  });
   $("filters").addEventListener("input", () => { drawFilters(); soon(); });
-  $("filters").addEventListener("submit", (/** @type {Event} */ event) => event.preventDefault());
+  $("filters").addEventListener("submit", (/** @type {Event} */ event) => {
+    event.preventDefault();
+    const bound = $("figure-bound").value;
+    if (!bound) return;
+    $("figure-bound").value = "";
+    rewrite(`${search.value} ${$("figure-name").value} ${$("figure-sign").value} ${bound}`);
+  });
   $("filters-toggle").addEventListener("click", () => { $("filters").hidden = !$("filters").hidden; drawFilters(); });
   $("filters-clear").addEventListener("click", () => { $("filters").reset(); $("recordings-search").value = ""; drawFilters(); changed(); });
 }
@@ -41,8 +55,12 @@ export function sortedByTime() {
   return ["", "oldest"].includes($("filter-sort").value);
 }
 
-/** Say on the button how many filters are set. */
+/** Say on the button how many filters are set, and show the conditions of the search field, each to be taken away. */
 export function drawFilters() {
+  const conditions = $("recordings-search").value.match(CONDITION) ?? [];
+  $("recordings-chips").hidden = !conditions.length;
+  $("recordings-chips").replaceChildren(...conditions.map((/** @type {string} */ condition) =>
+    make("button", { type: "button", "data-condition": condition, "aria-label": t("filters.without", { condition }) }, `${condition}  ×`)));
   const count = [...filterQuery().keys()].filter((name) => name !== "search" && name !== "sort").length;
   setText($("filters-words"), count ? t("filters.some", { count }) : t("filters.title"));
   $("filters-toggle").setAttribute("aria-expanded", String(!$("filters").hidden));

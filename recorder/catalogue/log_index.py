@@ -1,0 +1,373 @@
+"""What is known of the logs of a folder: read when they are new or have changed, kept in one file beside them."""
+
+import os
+import sqlite3
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from datetime import UTC
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, Protocol, TypeVar
+
+from recorder.catalogue import database, search
+from recorder.catalogue.entry import SUFFIX, Entry, LogState, read_entry, with_changes
+from recorder.catalogue.file_key import FileKey, file_key, key_of
+from recorder.catalogue.folder_watch import FolderWatch
+from recorder.catalogue.trash import trash_of
+from recorder.log.extent import CONTINUES, CONTINUES_AFTER
+from recorder.log.jumper_path import jumper_path
+from recorder.log.measured_path import measured_path
+from recorder.log.session_changes import session_path
+from recorder.log.write_lock import is_being_written
+from recorder.reading.log_reader import LogReader
+from rig.api.athletes import JumpQuery, folded
+from rig.api.jump import LastJump
+from rig.api.recordings import RecordingQuery
+from rig.api.statement import Level
+from rig.errors import BadInputError
+from rig.host.file_names import is_recording_id
+from rig.phrase import escaped
+from rig.transport import wire
+
+#: A growing log is read again when this many times the duration of the last reading has passed.
+_PATIENCE: Final = 10
+#: So many logs are read before what was learned of them is kept.
+_TOGETHER: Final = 100
+_INT64_MAX: Final = (1 << 63) - 1
+_LONGEST_SEARCHED: Final = 20_000
+#: Session fields that no person has written.
+_UNSEARCHED: Final = frozenset({"session", "recording", CONTINUES, CONTINUES_AFTER, "favourite"})
+
+#: Session fields that a list of jumps shows.
+_SHOWN: Final = ("athlete", "bib", "gate")
+
+#: Keys of the log, of the changes of its session, of its results (whole and live); None: there is no such file.
+Keys = tuple[FileKey | None, FileKey | None, FileKey | None, FileKey | None]
+_KEYS: Final = wire.decoder(Keys)
+_ENTRIES: Final = wire.decoder(Entry)
+_BESIDE: Final = (session_path, measured_path, jumper_path)
+_ENDINGS: Final = tuple(beside(Path("x.mcap")).name.removeprefix("x") for beside in _BESIDE)
+
+_Answer = TypeVar("_Answer")
+
+
+@dataclass(frozen=True, slots=True)
+class FoundJump:
+    """A measured jump.
+
+    Attributes:
+        jump: its main figures.
+        live: they were measured while it was recorded, and the log was not measured yet.
+    """
+
+    jump: LastJump
+    live: bool
+
+
+class Judge(Protocol):
+    """What the catalogue does not know by itself of a log."""
+
+    def level(self, entry: Entry) -> Level:
+        """How grave the verdict on it is."""
+        ...
+
+    def jumps(self, log: Path) -> Sequence[FoundJump]:
+        """The jumps that were measured in it."""
+        ...
+
+
+class NoJudge:
+    """Judges nothing: for programs that only list logs."""
+
+    def level(self, entry: Entry) -> Level:  # noqa: ARG002 - as the protocol wants it
+        """All are alike."""
+        return Level.INFO
+
+    def jumps(self, log: Path) -> Sequence[FoundJump]:  # noqa: ARG002 - as the protocol wants it
+        """None is known."""
+        return ()
+
+
+class LogIndex:
+    """Any thread may call any method; one is answered at a time.
+
+    Args:
+        directory: the folder; its trash belongs to it.
+        judge: asked about each log that is new or has changed.
+    """
+
+    def __init__(self, directory: Path, judge: Judge) -> None:
+        self._directory, self._judge = directory, judge
+        self._lock = threading.Lock()
+        self._connection: sqlite3.Connection | None = None
+        self._close: weakref.finalize[..., LogIndex] | None = None
+        self._watches = {deleted: FolderWatch(folder) for deleted, folder in self._folders().items()}
+        self._fresh_until: dict[str, float] = {}  # of growing logs, on `time.monotonic`, s
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._lock:
+            self._open(None)
+
+    def entry(self, path: Path) -> Entry:
+        """The entry of a file.
+
+        Raises:
+            FileNotFoundError: the file is no longer there.
+        """
+        name = str(path.relative_to(self._directory))
+        return self._answer(lambda connection: self._look(connection, name, _keys_of(path)))
+
+    def find(self, query: RecordingQuery) -> tuple[int, list[Entry]]:
+        """How many recordings fit a query, and those on the page that it asks for, in its order.
+
+        Raises:
+            BadInputError: its text cannot be understood.
+            OSError: the folder cannot be read.
+        """
+
+        def answer(connection: sqlite3.Connection) -> tuple[int, list[Entry]]:
+            self._look_around(connection, deleted=query.deleted)
+            total, paths = search.found_paths(connection, query)
+            asked = "SELECT entry FROM logs WHERE path = ?"
+            return total, [_ENTRIES.decode(connection.execute(asked, (path,)).fetchone()[0]) for path in paths]
+
+        return self._answer(answer)
+
+    def jumps(self, query: JumpQuery, columns: str) -> Sequence[tuple[Any, ...]]:
+        """Columns of the measured jumps that a query finds, as `search.found_jumps`.
+
+        Raises:
+            BadInputError: its text cannot be understood.
+            OSError: the folder cannot be read.
+        """
+
+        def answer(connection: sqlite3.Connection) -> Sequence[tuple[Any, ...]]:
+            self._look_around(connection, deleted=False)
+            return search.found_jumps(connection, query, columns)
+
+        return self._answer(answer)
+
+    def following(self, ids: Sequence[str], *, deleted: bool) -> Mapping[str, str]:
+        """Which recordings go on with which of these: ids by ids.
+
+        Raises:
+            OSError: the folder cannot be read.
+        """
+
+        def answer(connection: sqlite3.Connection) -> Mapping[str, str]:
+            self._look_around(connection, deleted=deleted)
+            asked = "SELECT continues, id FROM recordings WHERE continues = ? AND deleted = ? ORDER BY path"
+            return dict(row for each in ids for row in connection.execute(asked, (each, int(deleted))))
+
+        return self._answer(answer)
+
+    def _folders(self) -> dict[bool, Path]:
+        return {False: self._directory, True: trash_of(self._directory)}
+
+    def _open(self, connection: sqlite3.Connection | None) -> None:
+        """Use another connection, or none."""
+        if self._close is not None:
+            self._close()
+        self._connection = connection
+        # Python's connections are freed late, with what the disk is to be told last.
+        self._close = None if connection is None else weakref.finalize(self, connection.close)
+        for watch in self._watches.values():
+            watch.forget()
+
+    def _answer(self, asked: Callable[[sqlite3.Connection], _Answer]) -> _Answer:
+        """Ask the file; if it fails, a new one; if that fails too, memory."""
+        with self._lock:
+            for opened in (partial(database.open_database, self._directory), database.in_memory):
+                if self._connection is None:
+                    self._open(opened())
+                try:
+                    return asked(self._connection)  # type: ignore[arg-type] # it is open
+                except database.DAMAGED:
+                    self._open(None)
+            self._open(database.in_memory())
+            return asked(self._connection)  # type: ignore[arg-type] # it is open
+
+    def _look_around(self, connection: sqlite3.Connection, *, deleted: bool) -> None:
+        """Bring what is known of a folder up to date.
+
+        Raises:
+            FileNotFoundError: there is no such folder.
+            OSError: it cannot be read.
+        """
+        watch, folder = self._watches[deleted], self._folders()[deleted]
+        try:
+            names = watch.changed()
+            if names is None:
+                self._look_at_all(connection, folder, deleted=deleted)
+                return
+            growing = "SELECT path FROM recordings WHERE growing AND deleted = ?"
+            stems = {stem for name in names if (stem := _stem(name)) is not None}
+            stems |= {Path(row[0]).stem for row in connection.execute(growing, (int(deleted),)).fetchall()}
+            for stem in stems:
+                path = folder / f"{stem}{SUFFIX}"
+                with suppress(FileNotFoundError):
+                    self._look(connection, str(path.relative_to(self._directory)), _keys_of(path))
+        except FileNotFoundError:
+            watch.forget()
+            connection.execute("DELETE FROM recordings WHERE deleted = ?", (int(deleted),))
+            connection.execute("DELETE FROM logs WHERE path NOT IN (SELECT path FROM recordings)")
+            connection.execute("DELETE FROM jumps WHERE path NOT IN (SELECT path FROM recordings)")
+            raise
+        except BaseException:
+            watch.forget()  # what was told is not yet known
+            raise
+
+    def _look_at_all(self, connection: sqlite3.Connection, folder: Path, *, deleted: bool) -> None:
+        """Compare all files of a folder with what is known of them."""
+        with os.scandir(folder) as found:
+            files = {each.name: each for each in found}
+        below = "" if folder == self._directory else f"{folder.relative_to(self._directory)}/"
+        asked = "SELECT path, keys FROM logs WHERE path IN (SELECT path FROM recordings WHERE deleted = ?)"
+        known = dict(connection.execute(asked, (int(deleted),)).fetchall())
+        growing = "SELECT path FROM recordings WHERE growing"
+        changing = {row[0] for row in connection.execute(growing)}
+
+        def key(name: str) -> FileKey | None:
+            with suppress(OSError, KeyError):
+                return file_key(files[name].stat(follow_symlinks=False))
+            return None
+
+        new: list[tuple[str, Keys]] = []
+        for name in files:
+            if name.endswith(SUFFIX) and is_recording_id(stem := name.removesuffix(SUFFIX)):
+                keys: Keys = (key(name), *(key(f"{stem}{ending}") for ending in _ENDINGS))  # type: ignore[assignment]
+                kept = known.pop(below + name, None)
+                if kept is None or kept != wire.encode(keys) or below + name in changing:
+                    new.append((below + name, keys))
+        for start in range(0, len(new), _TOGETHER):
+            connection.execute("BEGIN")
+            try:
+                for name, keys in new[start : start + _TOGETHER]:
+                    with suppress(FileNotFoundError):  # it has just been removed
+                        self._look(connection, name, keys)
+            finally:
+                connection.execute("COMMIT")
+        for name in known:
+            database.remove(connection, name)
+
+    def _look(self, connection: sqlite3.Connection, name: str, keys: Keys) -> Entry:
+        """The entry of a file, read anew as far as it has changed.
+
+        Args:
+            connection: to the catalogue.
+            name: of the file, with the folder in which it lies below the directory.
+            keys: of the file and those beside it, as they are now.
+
+        Raises:
+            FileNotFoundError: the file is no longer there; then it is forgotten.
+        """
+        path, encoded = self._directory / name, wire.encode(keys)
+        row = connection.execute("SELECT keys, plain, entry FROM logs WHERE path = ?", (name,)).fetchone()
+        before: Keys = _KEYS.decode(row[0]) if row else (None, None, None, None)
+        try:
+            plain = _ENTRIES.decode(row[1]) if row and keys[0] is not None and before[0] == keys[0] else None
+            if row and plain is None and self._still_growing(path, name, keys[0], before[0]):
+                plain, keys = _ENTRIES.decode(row[1]), (before[0], *keys[1:])
+                encoded = wire.encode(keys)
+            if plain is None:
+                plain = self._read(path, name)
+        except FileNotFoundError:
+            database.remove(connection, name)
+            raise
+        growing = plain.state is LogState.UNFINISHED
+        if row and row[0] == encoded and not growing:
+            known: Entry = _ENTRIES.decode(row[2])
+            return known
+        entry, deleted = plain, "/" in name
+        if keys[1] is not None or deleted:
+            entry = with_changes(plain, path, deleted=deleted)
+        if growing and is_being_written(path):
+            entry = replace(entry, state=LogState.WRITING)
+        if row and row[0] == encoded and row[2] == wire.encode(entry):
+            return entry
+        jumps = None if row and before[2:] == keys[2:] else self._judge.jumps(path)
+        self._keep(connection, name, encoded, plain, entry, jumps)
+        return entry
+
+    def _read(self, path: Path, name: str) -> Entry:
+        began = time.monotonic()
+        plain = read_entry(path)
+        now = time.monotonic()
+        if plain.state is LogState.UNFINISHED:
+            self._fresh_until[name] = now + _PATIENCE * (now - began)
+        else:
+            self._fresh_until.pop(name, None)
+        return plain
+
+    def _still_growing(self, path: Path, name: str, key: FileKey | None, before: FileKey | None) -> bool:
+        """Whether a log that is being written was read only just now."""
+        if key is None or before is None or key[0] != before[0] or time.monotonic() > self._fresh_until.get(name, 0.0):
+            return False
+        try:
+            with LogReader(path, skim=True, links=False) as reader:
+                return not reader.closed
+        except (OSError, BadInputError):
+            return False  # then reading it anew says what is wrong
+
+    def _keep(
+        self,
+        connection: sqlite3.Connection,
+        name: str,
+        keys: bytes,
+        plain: Entry,
+        entry: Entry,
+        jumps: Iterable[FoundJump] | None,
+    ) -> None:
+        """Keep what was learned of a log; `jumps`: None if they are known."""
+        database.put(connection, "logs", (name, keys, wire.encode(plain), wire.encode(entry)))
+        session = {field: escaped(text) for field, text in entry.session.items()}
+        said = "\n".join((entry.id, *(text for field, text in session.items() if field not in _UNSEARCHED)))
+        bib = folded(session.get("bib", ""))
+        database.put(
+            connection, "recordings",
+            (
+                name, entry.id, int(entry.deleted), int(plain.state is LogState.UNFINISHED), _int64(entry.time),
+                float(entry.duration_s), self._judge.level(entry).value, folded(session.get("athlete", "")), bib,
+                int(bib) if bib.isascii() and bib.isdecimal() and len(bib) < 19 else None, int(entry.favourite),
+                "\n".join(("", *(folded(tag) for tag in entry.tags), "")), session.get(CONTINUES, ""),
+                folded(session.get("hill", "") or escaped(entry.rig)), folded(said[:_LONGEST_SEARCHED]),
+                wire.encode({folded(field): folded(text) for field, text in session.items()}).decode(),
+                wire.encode({field: session.get(field, "") for field in _SHOWN}).decode(),
+            ),
+        )  # fmt: skip
+        if jumps is None:
+            return
+        connection.execute("DELETE FROM jumps WHERE path = ?", (name,))
+        for found in jumps:
+            figures = (getattr(found.jump, figure) for figure in database.FIGURES)
+            database.put(
+                connection, "jumps",
+                (
+                    name, found.jump.jump, _int64(search.in_ns(found.jump.time.astimezone(UTC))), int(found.live),
+                    int(found.jump.ok),
+                    *(None if figure is None else float(figure.value) for figure in figures),
+                    found.jump.model_dump_json().encode(),
+                ),
+            )  # fmt: skip
+
+
+def _keys_of(path: Path) -> Keys:
+    beside = [key_of(each(path)) for each in _BESIDE]
+    return key_of(path), beside[0], beside[1], beside[2]
+
+
+def _stem(name: str) -> str | None:
+    """The id of the recording to which a file of this name belongs; None: to none."""
+    for ending in (SUFFIX, *_ENDINGS):
+        if name.endswith(ending) and is_recording_id(stem := name.removesuffix(ending)):
+            return stem
+    return None
+
+
+def _int64(value: int) -> int:
+    return max(-_INT64_MAX, min(_INT64_MAX, value))

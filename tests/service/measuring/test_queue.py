@@ -5,7 +5,7 @@ import os
 import shutil
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -70,9 +70,9 @@ class Bench:
         self.found: list[str] = []
         self.shown: list[Measurement] = []
         self.said: list[str] = []
-        catalogue = Catalogue(folder)
+        self.catalogue = catalogue = Catalogue(folder, LogJudge())
         self.removal = Removal(catalogue.delete, lambda: catalogue.trash().bytes, lambda: True)
-        self.earlier: Callable[[str], list[Path]] = MeasuredJumps(Catalogue(folder, LogJudge())).others_of_athlete
+        self.earlier: Callable[[str], list[Path]] = MeasuredJumps(catalogue).others_of_athlete
 
     @contextmanager
     def running(self) -> Iterator[Measurings]:
@@ -124,9 +124,11 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path: Path, hill: HillLog) -> Bench:
+def bench(tmp_path: Path, hill: HillLog) -> Iterator[Bench]:
     shutil.copy(hill.path, tmp_path / "jump.mcap")
-    return Bench(tmp_path, hill.survey)
+    made = Bench(tmp_path, hill.survey)
+    with closing(made.catalogue):
+        yield made
 
 
 @pytest.mark.long
@@ -154,7 +156,7 @@ def test_a_log_is_measured_after_the_end_of_its_recording_with_everything_beside
     assert live_results.latest(bench.folder) == jump
     _a_corrected_name_reaches_every_file(bench)
     assert live_results.takeoff_pulse(bench.log("jump")) == pytest.approx(30 - 16 + 1, abs=1)
-    catalogue = Catalogue(bench.folder)
+    catalogue = bench.catalogue
     catalogue.delete("jump")
     assert not measured_path(bench.log("jump")).exists()
     catalogue.restore("jump")
@@ -232,7 +234,7 @@ def test_what_is_recorded_while_a_log_is_measured_is_in_the_queue_of_a_service_t
 
 
 def test_a_recording_that_was_deleted_before_it_was_measured_is_measured_when_it_comes_back(bench: Bench) -> None:
-    catalogue = Catalogue(bench.folder)
+    catalogue = bench.catalogue
     bench.busy = True
     with bench.running() as queue:
         queue.opened(bench.log("jump"))

@@ -161,7 +161,7 @@ class LogIndex:
 
         def answer(connection: sqlite3.Connection) -> Mapping[str, str]:
             self._look_around(connection, deleted=deleted)
-            asked = "SELECT continues, id FROM recordings WHERE continues = ? AND deleted = ? ORDER BY path"
+            asked = "SELECT continues, id FROM recordings WHERE continues = ? AND continues != '' AND deleted = ?"
             return dict(row for each in ids for row in connection.execute(asked, (each, int(deleted))))
 
         return self._answer(answer)

@@ -83,6 +83,10 @@ class Catalogue:
         self._logs, self._places = LogIndex(directory, judge or NoJudge()), ImagePlaces()
         self._changing = threading.Lock()
 
+    def end_reading(self) -> None:
+        """Read no more logs that are new: the program ends."""
+        self._logs.end_reading()
+
     def close(self) -> None:
         """Close the catalogue's file."""
         self._logs.close()

@@ -102,14 +102,19 @@ class LogIndex:
 
     def __init__(self, directory: Path, judge: Judge) -> None:
         self._directory, self._judge = directory, judge
-        self._lock = threading.Lock()
+        self._lock, self._ending = threading.Lock(), threading.Event()
         self._connection: sqlite3.Connection | None = None
         self._close: weakref.finalize[..., LogIndex] | None = None
         self._watches = {deleted: FolderWatch(folder) for deleted, folder in self._folders().items()}
         self._fresh_until: dict[str, float] = {}  # of growing logs, on `time.monotonic`, s
 
+    def end_reading(self) -> None:
+        """Read no more new logs: thousands of them take a minute or more, and the program ends."""
+        self._ending.set()
+
     def close(self) -> None:
         """Close the file."""
+        self.end_reading()
         with self._lock:
             self._open(None)
 
@@ -248,6 +253,8 @@ class LogIndex:
             connection.execute("BEGIN")
             try:
                 for name, keys in new[start : start + _TOGETHER]:
+                    if self._ending.is_set():
+                        return
                     with suppress(FileNotFoundError):  # it has just been removed
                         self._look(connection, name, keys)
             finally:

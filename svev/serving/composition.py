@@ -161,7 +161,7 @@ def serve(settings: ServiceSettings) -> None:
             server.should_exit = True
 
         supervisor.hooks.on_end = end
-        with _signals(server, supervisor, notify):
+        with _signals(server, supervisor, notify, catalogue):
             supervisor.start()
             try:
                 _tell_of_folders(settings, rig, data, hub, exports)
@@ -305,13 +305,14 @@ class _Reporter:
 
 
 @contextmanager
-def _signals(server: PanelServer, supervisor: Supervisor, notify: Notify) -> Iterator[None]:
+def _signals(server: PanelServer, supervisor: Supervisor, notify: Notify, catalogue: Catalogue) -> Iterator[None]:
     """Within, signals end the service in order, however often they come; afterwards nothing disturbs its end."""
 
     def end(*_: object) -> None:
         server.should_exit = True
         notify.stopping()
         supervisor.begin_stop()
+        catalogue.end_reading()
 
     for number in ENDINGS:
         signal.signal(number, end)

@@ -50,6 +50,27 @@ def test_a_new_catalogue_reads_only_what_is_new(tmp_path: Path, looks: list[str]
     assert looks == ["d"]
 
 
+def test_a_program_that_ends_does_not_read_on_and_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b", "c"):
+        write_log(tmp_path / f"{name}.mcap", JUMP)
+    ending, read = Catalogue(tmp_path), []
+
+    def end(path: Path) -> Entry:
+        read.append(path.stem)
+        ending.end_reading()
+        return read_entry(path)
+
+    monkeypatch.setattr(log_index, "read_entry", end)
+    first = ending.entries()
+    assert [entry.id for entry in first] == read
+    assert len(read) == 1
+    ending.close()
+    assert [entry.id for entry in Catalogue(tmp_path).entries()] == ["c", "b", "a"]
+    assert sorted(read) == ["a", "b", "c"]
+
+
 def test_changed_session_fields_are_those_beside_the_log(tmp_path: Path) -> None:
     write_log(tmp_path / "a.mcap", JUMP)
     Catalogue(tmp_path).entries()

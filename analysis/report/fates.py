@@ -21,8 +21,8 @@ WHY: Final = {
 }
 CAPTION: Final = (
     "What became of each point and ski. Thick: green has a raw solution, grey was not found in two images, red was "
-    "refused. Thin, camera by camera: green is used, amber is left out by the model over time, red contradicts the "
-    "other images, blue is measured but without solution, grey is not found. Empty: out of sight, or no frame."
+    "refused. Thin, {cameras} in this order: green is used, amber is left out by the model over time, red contradicts "
+    "the other images, blue is measured but without solution, grey is not found. Empty: out of sight, or no frame."
 )
 _PART: Final = {
     Fate.USED: Colour.GREEN,
@@ -70,7 +70,8 @@ def fates_drawing(jump: Jump) -> Drawing | None:
     for place, anchor in ((0, "start"), (len(pulses) - 1, "end")):
         x = _LEFT if place == 0 else WIDTH - _RIGHT
         svg.text(x, svg.height - _GAP / 2, f"{'pulse ' if place == 0 else ''}{pulses[place].pulse}", anchor)
-    return Drawing(CAPTION, svg.rendered(CAPTION))
+    caption = CAPTION.format(cameras=", ".join(cameras))
+    return Drawing(caption, svg.rendered(caption))
 
 
 def _strip(svg: Svg, colours: Sequence[Colour | None], row: tuple[float, float], wide: float) -> None:

@@ -147,6 +147,6 @@ def test_the_page_draws_what_became_of_each_point(tmp_path: Path) -> None:
     result = measured_recording()
     _, page = write_protocol(result, measurements(), tmp_path)
     text = page.read_text()
-    assert text.count(f'aria-label="{CAPTION}"') == len(result.jumps)
+    assert text.count(f'aria-label="{CAPTION.format(cameras="K1, K2, K3")}"') == len(result.jumps)
     bare = replace(result.jumps[0], pulses=tuple(replace(p, fates={}) for p in result.jumps[0].pulses))
     assert "What became of each point" not in _text(replace(result, jumps=(bare,)))

@@ -208,12 +208,11 @@ class RigProcesses:
         if restart.renewed:
             self._camera_gone(name, phrase("why_other_settings", "it gets other settings, and is back at once"))
         elif restart.wait_s is not None:
-            kind, text = (
-                ("why_grabber_ended", "grabber process ended ({how})")
-                if name in self._programs.cameras
-                else ("why_process_ended", "process ended ({how})")
-            )
-            reason = phrase(kind, text, how=child.ending() or "")
+            how = child.ending() or ""
+            if name in self._programs.cameras:
+                reason = phrase("why_grabber_ended", "grabber process ended ({how})", how=how)
+            else:
+                reason = phrase("why_process_ended", "process ended ({how})", how=how)
             text = "{why}; starting it again in {seconds:g} s"
             said = phrase("event_process_again", text, why=reason, seconds=restart.wait_s)
             self._on_event(Event.now(Level.ERROR, name, said))

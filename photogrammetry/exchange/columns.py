@@ -13,6 +13,8 @@ from rig.errors import BadInputError
 
 #: Characters that separate cells in files of other dialects.
 _SEPARATING: Final = re.compile(r"[,;\t ]")
+#: No camera has a shorter principal distance, mm.
+_SHORTEST_MM: Final = 1.0
 
 
 def read_survey_csv(path: Path) -> Part:
@@ -60,6 +62,8 @@ def _interior(path: Path) -> Part:
     for line in lines:
         if "c" not in line.values:
             raise BadInputError(f"{line.place}: the principal distance is missing; write camera, c, x0, y0, ...")
+        if abs(line.values["c"]) < _SHORTEST_MM:
+            raise BadInputError(f"{line.place}: c = {line.values['c']:g} mm is no principal distance; correct it")
         entry: dict[str, Any] = {name: line.values[name] for name in (*INTERIOR, "r0") if name in line.values}
         cameras[_new(line, "camera", cameras)] = entry | {"c": abs(entry["c"]), "distortion": "measured"}
     return Part(str(path), ImageFrame.METRIC, cameras, notes=(*notes, f"{path.name}: c is positive in the network"))

@@ -45,13 +45,13 @@ _MORE: Final[Mapping[str, frozenset[str]]] = {
     ".ior": frozenset(),
     ".eor": frozenset(f"{angle}_{unit}" for angle in ANGLES for unit in ANGLE_UNITS),
 }
-_WITH_SIGMA: Final = ("name", "x", "y", "z", "sx")
 _FEWEST_NAMED: Final = 3  # columns, in a comment that is a head
 #: Blanks that may be an empty cell.
 _WIDE: Final = re.compile(r"^[ \t]|[ \t]{2}|[ \t]$")
 _WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
-#: No principal point is so far from the middle of a picture, mm.
+#: No principal point is so far from the middle of a picture: mm, and as a share of c.
 _FAR_MM: Final = 1.0
+_FAR_SHARE: Final = 0.25
 #: Axes of a surveyor, by what they are: X is east, Y north, Z height, which is right-handed.
 _SURVEYORS: Final = {
     **dict.fromkeys(("e", "east", "easting", "øst"), "x"),
@@ -96,22 +96,25 @@ def read_lines(path: Path) -> tuple[list[Line], tuple[str, ...]]:
         raise BadInputError(f"{path}: is empty; name a file with lines {', '.join(columns)}")
     for row in body:
         _check_count(row, columns, all_given=head is not None and ending != ".ior")
+        if head is None or file.separator == ",":
+            _check_end(row, len(columns) if head is None else len(head.cells))
     cells = [dict(zip(columns, row.cells, strict=False)) for row in body]
     words = [word for each in cells for column, word in each.items() if column not in _LABELS]
     points = with_points(words, file.separator, path)
     if file.separator == " " or (file.separator == "," and head is None):
         _check_names(file.separator, body)
-    if head is None and ending == ".ior" and file.separator == " ":
-        _check_cameras(body)
+    if head is None and ending == ".ior":
+        _check_cameras(file.separator, body)
     if head is None:
         _check_unnamed(file.separator, words, path)
         if file.separator in (" ", ",") and "sx" in columns:
             _check_even(body, columns)
-        if file.separator == " " and "sx" in columns:
-            _check_blanks(body, columns)
-        _check_ids(cells, path)
+        if "sx" in columns:
+            _check_first(file.separator, body, columns, path)
     elif file.separator == " ":
         _check_hidden(body, columns)
+    if file.separator == " " and (ending == ".ior" or (head is None and "sx" in columns)):
+        _check_blanks(body, columns)
     lines = [_line(row, each, points, ending) for row, each in zip(body, cells, strict=True)]
     hidden = sum(row.comment and sum(is_number(word) for word in row.cells) >= _FEWEST_NAMED for row in file.rows)
     left_out = (f"{path.name}: {hidden} lines of numbers are comments (# or !) and left out",) if hidden else ()
@@ -190,6 +193,15 @@ def _check_count(row: Row, columns: Sequence[str], *, all_given: bool) -> None:
         )
 
 
+def _check_end(row: Row, most: int) -> None:
+    """Refuse a line with more cells than there are columns, even empty ones: one separator is of a number or a name."""
+    if len(row.cells) > most:
+        raise BadInputError(
+            f"{row.place}: {len(row.cells)} cells instead of {most}; name the columns in the first line, write "
+            'decimals with a point, and "..." around names'
+        )
+
+
 def _check_unnamed(separator: str, words: Sequence[str], path: Path) -> None:
     """Refuse lines without named columns whose commas may be decimal ones, or where an empty cell would not be seen.
 
@@ -224,59 +236,76 @@ def _check_even(body: Sequence[Row], columns: Sequence[str]) -> None:
 
 
 def _check_blanks(body: Sequence[Row], columns: Sequence[str]) -> None:
-    """Refuse points separated by blanks, without named columns, where a cell may be empty or belong to the name.
-
-    Raises:
-        BadInputError: a line that has not all cells has more than one blank at a place; or some cells behind the names
-            are whole numbers, and other numbers in lines of as many cells are none.
-    """
+    """Refuse lines separated by blanks, of which one that has not all cells has more than one blank at a place."""
     for row in body:
         if _WIDE.search(row.text) and len(row.cells) < len(columns):
             raise BadInputError(
                 f"{row.place}: several blanks at one place, which may be an empty cell; name the columns in the first "
                 "line, or separate the cells by semicolons"
             )
-        behind = columns.index("name") + 1  # of image points the image stands before the name
-        alike = [word for other in body if len(other.cells) == len(row.cells) for word in other.cells[behind:][:3]]
-        decimals = any(is_number(word) and not _is_whole(word) for word in alike)
-        two_sigmas = columns[0] == "image" and row.cells[-1] == row.cells[-2]  # one of them would be a coordinate
-        if decimals and not two_sigmas and row.cells[behind:] and row.cells[behind].isdecimal():
-            raise _may_be_one(row.cells[behind - 1], row.cells[behind], " ", row)
 
 
-def _check_cameras(body: Sequence[Row]) -> None:
-    """Refuse cameras, separated by blanks and without named columns, whose c may be the end of the name.
+def _check_cameras(separator: str, body: Sequence[Row]) -> None:
+    """Refuse cameras without named columns whose c may be the end of the name: c would be the principal point.
 
     Raises:
-        BadInputError: c is a whole number, and the principal point behind it is so far off that it may be c.
+        BadInputError: the principal point is so far off that it may be c.
     """
     for row in body:
         name, c, behind = (*row.cells, "", "")[:3]
-        if c.isdecimal() and is_number(behind) and abs(_number(behind)) >= _FAR_MM:
-            raise _may_be_one(name, c, " ", row)
+        if is_number(c) and is_number(behind) and abs(_number(behind)) >= _FAR_MM:
+            if c.isdecimal() or abs(_number(behind)) > _FAR_SHARE * abs(_number(c)):
+                raise _may_be_one(name, c, separator, row)
 
 
 def _number(word: str) -> float:
     return float(word.replace(",", "."))
 
 
-def _check_ids(cells: Sequence[Mapping[str, str]], path: Path) -> None:
-    """Refuse lines without named columns that may begin with two names: whole numbers, then coordinates.
+def _check_first(separator: str, body: Sequence[Row], columns: Sequence[str], path: Path) -> None:
+    """Refuse points without named columns whose first coordinate may be a part of the name, or a second name.
+
+    With a name of two cells, two sigmas or none are three sigmas or one. Semicolons and tabs hardly stand in names, but
+    the first column may number the lines.
 
     Raises:
-        BadInputError: X is whole in all lines and Y and Z are in none, or a line is two names and three coordinates as
-            well as a name, three coordinates and a sigma, all of them whole.
+        BadInputError: the first coordinate is a whole number and other cells say nothing about it.
     """
-    coordinates = [[each.get(column, "") for column in ("x", "y", "z")] for each in cells]
-    decimals = all(
-        x.isdecimal() and is_number(y) and is_number(z) and not _is_whole(y) and not _is_whole(z)
-        for x, y, z in coordinates
-    )
-    if decimals or all(tuple(each) == _WITH_SIGMA and all(map(_is_whole, each.values())) for each in cells):
+    behind = columns.index("name") + 1  # of image points the image stands before the name
+    fewest = behind + 4  # cells that are too few for a longer name
+    first = [row for row in body if all(row.cells[fewest - 1 :] or [""]) and row.cells[behind].isdecimal()]
+    alike = len(body) > 1 and len({row.cells[columns.index("sx") :] for row in body}) == 1
+    unsure = next((row for row in first if not _is_sure(row, behind, columns, alike=alike)), None)
+    if unsure is None:
+        return
+    if separator in (" ", ","):
+        raise _may_be_one(unsure.cells[behind - 1], unsure.cells[behind], separator, unsure)
+    if len(first) == len(body):
         raise BadInputError(
-            f"{path}: the second column holds whole numbers alone and may be no coordinate; name the columns "
-            "in the first line"
+            f"{path}: the {'second' if behind == 1 else 'third'} column holds whole numbers alone and may be no "
+            "coordinate; name the columns in the first line"
         )
+
+
+def _is_sure(row: Row, behind: int, columns: Sequence[str], *, alike: bool) -> bool:
+    """Whether the first coordinate of a line, a whole number, is one: all are whole and no sigma is, or sx is sy.
+
+    The sigmas have to be those of all lines, or one beside a name that does not look like a part of one.
+
+    Args:
+        row: the line.
+        behind: place of the first coordinate.
+        columns: of the file.
+        alike: all lines have the same sigmas.
+    """
+    sigmas = row.cells[columns.index("sx") :]
+    if any(map(_is_whole, sigmas)):
+        return False
+    if columns[0] == "image" and len(set(sigmas)) == 1 < len(sigmas):  # a coordinate and a sigma would differ
+        return True
+    name = row.cells[behind - 1]
+    one = len(sigmas) == 1 and not (name.isalpha() or name.isdecimal())
+    return (alike or one) and all(map(_is_whole, row.cells[behind : columns.index("sx")]))
 
 
 def _is_whole(word: str) -> bool:
@@ -307,7 +336,7 @@ def _check_hidden(body: Sequence[Row], columns: Sequence[str]) -> None:
     Raises:
         BadInputError: one blank separates a name from digits alone, and several are at another place.
     """
-    place = columns.index("name") if "name" in columns else 0
+    place = max((columns.index(label) for label in _LABELS if label in columns), default=0)
     hidden = re.compile(rf"[ \t]*(\S+[ \t]+){{{place}}}\S+[ \t]\S.*([ \t]{{2}}|[ \t]$)")
     for row in body:
         if row.cells[place + 1 :] and row.cells[place + 1].isdecimal() and hidden.match(row.text):

@@ -99,7 +99,7 @@ def test_calibrations_and_surveyed_balls_are_a_survey_for_logs(
     for name in ("K1", "K2"):
         write_opencv(tmp_path / f"{name}.yml", K, D)
     (tmp_path / "balls.csv").write_text("Name;X;Y;Z;Sigma\nB1;0,523;-2,874;-1,871;0,012\nB2;1;2;3;0,02\n")
-    (tmp_path / "more.csv").write_text("B3,1,2,3,0.01,0.02,0.03\n# measured on Tuesday\nB4,1,2.5,3,0.01,0.02,0.03\n")
+    (tmp_path / "more.csv").write_text("B3,1,2,3,0.01,0.02,0.03\n# measured on Tuesday\nB4,1.0,2.5,3,0.01,0.02,0.03\n")
     files = [str(tmp_path / name) for name in ("K1.yml", "K2.yml", "balls.csv", "more.csv")]
     assert main(["network", "import", *files, "--force", "-o", str(tmp_path / "hill.json"), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)

@@ -100,6 +100,11 @@ def test_a_table_is_read_as_it_stands(text: str | bytes, tmp_path: Path) -> None
         ("name;X;Y;Z;s(mm)\nB1;1;2;3;5\n", r"column 's\(mm\)': all lengths of a file have one unit"),
         ("name;X;Y;Z;code;s\nB1;1;2;3;4;0.1\n", "column 'code' is not known"),
         ("Name;Y;X;H\nB1;1;2;3\n", "column 'H': in a surveyor's system X may point north"),
+        ("1,5,10.5,20,3.5,0.01,0.01\n", "line 1: '1,5' may be one name"),
+        ("B2,11.5,21.5,4.5,1,1,1\nB1,1,29,17,112.24,0.01,0.01\n", "line 2: 'B1,1' may be one name"),
+        ("1,5,20,3,0.5\n", "line 1: '1,5' may be one name"),
+        ("NAME,X,Y,Z,sigma\n0,5,97.092,47.9,141.731,\n", "line 2: 6 cells instead of 5"),
+        ("name,X,Y,Z,s\nB1,10,5,20,3,\n", "line 2: 6 cells instead of 5"),
         ("X;Y;Z;s\n1;2;3;0.1\n", "column 'name' is missing"),
         ("name;X;Y;Z;s\n;1;2;3;0.1\n", "line 2: '' is no name"),
         ("name;X;Y;Z;s\n'B1';1;2;3;0.1\n", "line 2: \"'B1'\" is no name"),
@@ -185,10 +190,46 @@ def test_object_points_in_wide_columns_are_read_where_none_is_empty(text: str, t
     assert _points(_file(tmp_path, text, "points.obc")) == BALLS
 
 
-@pytest.mark.parametrize("text", ["K1 7 8.5 0.01 -0.02\n", "B1 8.50 0.010 0\nK1 7 8 0 0\n"])
-def test_cameras_whose_c_may_be_of_the_name_are_refused(text: str, tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match="'K1 7' may be one name"):
+@pytest.mark.parametrize(
+    ("text", "pattern"),
+    [
+        ("K1 7 8.5 0.01 -0.02\n", "'K1 7' may be one name"),
+        ("B1 8.50 0.010 0\nK1 7 8 0 0\n", "'K1 7' may be one name"),
+        ("2,25,42.80,0.37,-0.5\n", "'2,25' may be one name"),
+        ("1;5;46.851;-0.467;-0.026\n", "'1;5' may be one name"),
+        ("1 12.7 9.36 -0.365 0.193\n", "'1 12.7' may be one name"),
+        ("B317 58.55  0.4\n", "line 1: several blanks at one place, which may be an empty cell"),
+        ("camera c x0 y0\nB1  0.199 0.07\n", "line 2: several blanks at one place, which may be an empty cell"),
+        ("B7;0;0;0\n", "line 1: c = 0 mm is no principal distance"),
+    ],
+)
+def test_cameras_whose_cells_may_be_others_are_refused(text: str, pattern: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=pattern):
         import_network([_file(tmp_path, text, "a.ior")])
+
+
+@pytest.mark.parametrize(
+    ("text", "pattern"),
+    [
+        ("# image camera x0 y0 z0\nB317 K1 2 0.360  110.377\n", "'K1 2' may be one name"),
+        ("1;B17;5;60.263;3.855;\n", "line 1: 6 cells instead of 5"),
+    ],
+)
+def test_poses_whose_cells_may_be_others_are_refused(text: str, pattern: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=pattern):
+        read_aicon(_file(tmp_path, text, "a.eor"), None)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("7,0,0,0,0.005\n8,10,0,0,0.005\n", ["7", "8"]),
+        ("B1,0,0,0,0.005\n", ["B1"]),
+        ("B1;5;2.5;3;1\nB2;1.5;2;3;1\n", ["B1", "B2"]),
+    ],
+)
+def test_whole_numbers_are_read_where_nothing_else_fits(text: str, names: list[str], tmp_path: Path) -> None:
+    assert list(_points(_file(tmp_path, text))) == names
 
 
 @pytest.mark.parametrize(

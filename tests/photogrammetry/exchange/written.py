@@ -106,7 +106,7 @@ AICON = {
     "poses.eor": "# image camera X0 Y0 Z0 omega_gon phi_gon kappa_gon\n"
     f"1 7 1.0 2.0 3.0 {0.3 * 200 / np.pi} {-0.2 * 200 / np.pi} {1.1 * 200 / np.pi}\n2 7 4 5 6 0 0 0\n",
     "points.phc": "1 T1 1.25 -2.5 0.001 0.002\n2 T1 1.5 2.5 0.001 0.002\n1 T2 0 0 0.001 0.001\n",
-    "points.obc": "T1 1 2 -8 0.01 0.01 0.02\nT2 0.5 0.5 -9\n",
+    "points.obc": "T1 1.0 2.0 -8.0 0.01 0.01 0.02\nT2 0.5 0.5 -9\n",
 }
 
 

@@ -40,10 +40,10 @@ class Case:
         slips_ms: by how much the times of frames are off from then on, in turns, while the clock that is read goes on.
         at_miss: the camera whose clock is set, or whose times slip, misses the pulse.
         at_loss: the camera's frame at the trouble is lost.
-        together: all clocks are set, or slip, at once.
+        at_once: how many cameras a trouble concerns at once.
         spikes_ms: by how much the time of a single frame is off, in turns; then it goes on as before.
         stalls_ms: for how long the computer takes no frames; then it takes all at once.
-        delays_ms: by how much later the frames of all cameras come from then on, in turns.
+        delays_ms: by how much later frames come from then on, in turns.
         skipped_ids: by how much the numbers of frames go on without any frame, in turns.
         doubled: probability of a second pulse, `double_ms` later; half of them hide the first from some cameras.
     """
@@ -55,7 +55,7 @@ class Case:
     slips_ms: tuple[float, ...] = ()
     at_miss: bool = False
     at_loss: bool = False
-    together: bool = False
+    at_once: int = 1
     spikes_ms: tuple[float, ...] = ()
     stalls_ms: tuple[float, ...] = ()
     delays_ms: tuple[float, ...] = ()
@@ -111,6 +111,7 @@ class _Camera:
     offset: int = 0
     slip: int = 0
     spike: int = 0
+    delay: float = 0.0
     loses: bool = False
     next_id: int = 1
     busy_until: float = -math.inf
@@ -143,7 +144,7 @@ class Hill:
         self._times: dict[int, float] = {}  # true time of the pulses that may still be decided
         self._decided: set[int] = set()
         self._suspensions: list[tuple[float, float]] = []
-        self._slept = self._stalled_until = self._delay = 0.0
+        self._slept = self._stalled_until = 0.0
         self._next_trouble = max(_QUIET_S, case.every_s) * NS_PER_S
         self._troubles = self._count = 0
         self._held: dict[int, int] = {}
@@ -188,7 +189,7 @@ class Hill:
             return
         self._next_trouble = time + case.every_s * NS_PER_S
         camera = self._cameras[self._troubles % 3]
-        for each in self._cameras if case.together else [camera]:
+        for each in [self._cameras[(self._troubles + more) % 3] for more in range(case.at_once)]:
             each.offset += round(self._turn(case.steps_ms) * MS)
             each.slip += round(self._turn(case.slips_ms) * MS)
             each.spike = round(self._turn(case.spikes_ms) * MS)
@@ -196,7 +197,7 @@ class Hill:
             if case.at_miss:
                 each.busy_until = time + MS
             each.loses = case.at_loss
-        self._delay = self._turn(case.delays_ms) * MS
+            each.delay = self._turn(case.delays_ms) * MS
         if case.stalls_ms:
             self._stalled_until = time + self._turn(case.stalls_ms) * MS
         if case.reboots:
@@ -233,7 +234,7 @@ class Hill:
 
     def _send(self, camera: _Camera, pulse: int, number: int, time: float) -> None:
         case, rng = self._case, self._rng
-        latency = rng.uniform(*case.latency_ms) * MS + self._delay
+        latency = rng.uniform(*case.latency_ms) * MS + camera.delay
         arrival = max(camera.last_arrival, time + latency, self._stalled_until)
         camera.last_arrival = arrival
         device = DeviceNs(camera.device(time + rng.random() * case.jitter_ms * MS) + camera.slip + camera.spike)

@@ -38,14 +38,20 @@ CASES: Final = (
     Case("times of one camera slip by 2 ms", slips_ms=(2.0,), every_s=30.0, missed=0.05, lost=0.05),
     *(Case(f"clocks step by {ms:g} ms", steps_ms=(ms, -ms)) for ms in (0.8, 2.0, 5.0)),
     Case("clocks step back at a missed pulse", steps_ms=(-math.inf,), at_miss=True),
-    Case("all clocks step together", steps_ms=(math.inf, -math.inf, 2.0), together=True),
+    Case("all clocks step together", steps_ms=(math.inf, -math.inf, 2.0), at_once=3),
+    Case("all clocks step, at a missed pulse", steps_ms=(math.inf, -math.inf), at_miss=True, at_once=3),
+    Case("times slip by half a period, at a missed pulse", slips_ms=(-16.5,), at_miss=True, every_s=15.0),
+    Case("times of two cameras slip by 7 ms", slips_ms=(-7.0,), at_once=2, every_s=15.0),
     Case("single times are off", spikes_ms=(-math.inf, math.inf, -5.0, 16.0)),
     Case("single times are off, behind a lost frame", spikes_ms=(-math.inf,), at_loss=True),
     Case("the computer stands still for 0.3 s", stalls_ms=(300.0,)),
     Case("the computer stands still, clocks step", stalls_ms=(300.0,), steps_ms=(math.inf, -math.inf)),
     Case("the computer stands still, times slip", stalls_ms=(300.0,), slips_ms=(-math.inf, math.inf), every_s=15.0),
-    Case("all frames come one period later", delays_ms=(math.inf, 0.0)),
-    Case("all frames come a little later, at 120 Hz", rates_hz=(120.0,), rate_hz=120.0, delays_ms=(8.0, 0.0)),
+    Case("all frames come one period later", delays_ms=(math.inf, 0.0), at_once=3),
+    Case(
+        "all frames come a little later, at 120 Hz", rates_hz=(120.0,), rate_hz=120.0, delays_ms=(8.0, 0.0), at_once=3
+    ),
+    Case("frames of one camera come 50 ms later", delays_ms=(50.0, 0.0), latency_ms=(5.0, 9.0)),
     Case("frame numbers skip", skipped_ids=(1, 2, 100)),
 )
 

@@ -253,9 +253,10 @@ def _check_cameras(separator: str, body: Sequence[Row]) -> None:
     """
     for row in body:
         name, c, behind = (*row.cells, "", "")[:3]
-        if is_number(c) and is_number(behind) and abs(_number(behind)) >= _FAR_MM:
-            if c.isdecimal() or abs(_number(behind)) > _FAR_SHARE * abs(_number(c)):
-                raise _may_be_one(name, c, separator, row)
+        if not is_number(c) or not is_number(behind) or abs(_number(behind)) < _FAR_MM:
+            continue
+        if c.isdecimal() or abs(_number(behind)) > _FAR_SHARE * abs(_number(c)):
+            raise _may_be_one(name, c, separator, row)
 
 
 def _number(word: str) -> float:
@@ -282,7 +283,7 @@ def _check_first(separator: str, body: Sequence[Row], columns: Sequence[str], pa
         raise _may_be_one(unsure.cells[behind - 1], unsure.cells[behind], separator, unsure)
     if len(first) == len(body):
         raise BadInputError(
-            f"{path}: the {'second' if behind == 1 else 'third'} column holds whole numbers alone and may be no "
+            f"{path}: the column after the name holds whole numbers alone and may be no "
             "coordinate; name the columns in the first line"
         )
 

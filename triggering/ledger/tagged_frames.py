@@ -47,12 +47,16 @@ def is_of_another_pulse(last: TaggedFrame, frame: TaggedFrame, by_clock: float, 
     """Whether a frame is filed under a wrong pulse: clock and frame number agree on another one.
 
     If the number contradicts the clock, the clock was set. A camera that missed a pulse while its clock was set back by
-    just one period looks alike; there, the arrival decides. `certain`: no pulse between the two is tagged as missing.
+    just one period looks alike, and so do all cameras where a pulse between has no tag; there, the arrival decides.
+    `certain`: no pulse between the two is tagged as missing.
     """
-    step = id_step(last.frame_id, frame.frame_id)
+    step, pulses = id_step(last.frame_id, frame.frame_id), frame.pulse - last.pulse
     if abs(by_clock - step * nearest) >= nearest / 2:
         return False
-    return certain or step > frame.pulse - last.pulse or abs(by_clock - (frame.host - last.host)) < nearest / 2
+    untagged = frame.time - last.time > (pulses + 0.5) * nearest
+    if not untagged and (certain or step > pulses):
+        return True
+    return abs(by_clock - (frame.host - last.host)) < nearest / 2
 
 
 def recomputed(

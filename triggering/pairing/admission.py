@@ -37,7 +37,7 @@ class Admission:
     def admits(self, camera: int, record: FrameRecord, time: HostNs) -> bool:
         """Whether a frame that has just come, triggered at `time`, is accepted at once."""
         track = self._tracks[camera]
-        track.times.arrivals.heard(record.host_time - time)
+        track.times.arrivals.heard(record.host_time, record.host_time - time)
         if len(self._tracks) == 1 or not track.times.plausibility.warm:
             return True
         if track.times.plausibility.doubted:
@@ -71,10 +71,11 @@ class Admission:
     def _believe_common_delay(self) -> None:
         """Learn all latencies anew if they have changed alike in all cameras: the link or the computer has changed.
 
-        Times that slip do so in one camera, and not in all of them at once.
+        Times that slip do so in one camera, and not in all of them at once. Clocks may be set at once, and so they have
+        to be read first.
         """
         there = [track.times for track in self._tracks if track.delivers and not track.silent]
-        changes = [change for times in there if (change := times.arrivals.change_ns) is not None]
+        changes = [change for times in there if (change := times.latency_change_ns) is not None]
         since = [times.plausibility.doubted for times in there]
         period = self._train.period_ns
         at_once = len(changes) == len(there) >= _SEVERAL and min(since) > 0 and max(since) - min(since) <= LASTING
@@ -101,9 +102,13 @@ class Admission:
         """Accept or refuse the first frame of a camera that waits, which has waited for as long as it may."""
         waiting = self._held.frames(camera)
         if waiting:
-            if self._tracks[camera].judge(waiting, self._others[camera], final=True) is Verdict.ACCEPTED:
+            track = self._tracks[camera]
+            verdict = track.judge(waiting, self._others[camera], final=True)
+            if verdict is Verdict.ACCEPTED:
                 yield from self._accept(camera, waiting[0])
             else:
+                if verdict is Verdict.REJECTED:
+                    track.doubt()
                 self._refuse(camera, waiting[0])
         yield from self._settle(camera)
 

@@ -88,15 +88,15 @@ class KnownPulses:
                 return
             yield pulse
 
-    def nearest_decided(self, time: HostNs, cameras: int) -> HostNs | None:
-        """Time of the decided pulse nearest to a time of which one of some cameras delivered a frame.
+    def nearest_decided(self, time: HostNs, cameras: int) -> tuple[HostNs, int] | None:
+        """Time of the decided pulse nearest to a time of which one of some cameras delivered a frame, and which did.
 
         Args:
             time: the time.
             cameras: one bit each.
         """
-        those = (of for of, delivered in zip(self._decided, self._delivered, strict=True) if delivered & cameras)
-        return min(those, key=lambda of: abs(of - time), default=None)
+        those = ((of, who) for of, who in zip(self._decided, self._delivered, strict=True) if who & cameras)
+        return min(those, key=lambda of: abs(of[0] - time), default=None)
 
     def count(self, since: HostNs, until: HostNs, tolerance: float, frames: Iterable[HostNs]) -> int | None:
         """How many pulses there are after one time, until another; None: that is too long ago.

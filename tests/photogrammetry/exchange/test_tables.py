@@ -87,12 +87,12 @@ def test_a_table_is_read_as_it_stands(text: str | bytes, tmp_path: Path) -> None
         ("Id;Name;X;Y;Z;s\n7;B1;1;2;3;0.1\n", "columns 'Id' and 'Name' are the same, name"),
         (
             "1;17;10.5;20.5;3.5\n2;18;11.5;21.5;4.5\n",
-            "the second column holds whole numbers alone and may be no coordinate",
+            "the column after the name holds whole numbers alone and may be no coordinate",
         ),
         ("name X Y Z s\n5 6 -22.5 33.5  1\nB2 1.5 2.5 3.5 1\n", "line 2: '5 6' may be one name"),
         (
             "1;17;10;20;3\n2;18;11;21;4\n",
-            "the second column holds whole numbers alone and may be no coordinate",
+            "the column after the name holds whole numbers alone and may be no coordinate",
         ),
         ("name;X;Y;Z;s\nB1;1,234;25;30;1\n", "the comma of '1,234' beside '25' may separate thousands"),
         ("Punkt;Rechts;Hoch;Oben\nB1;1;2;3\n", "line 1: column 'Rechts' is not known"),

@@ -8,8 +8,10 @@ decide (Wald, Ann. Math. Stat. 16, 1945).
 import math
 from collections import deque
 from collections.abc import Sequence
+from itertools import islice
 from typing import Final, NamedTuple
 
+from rig.clocks import HostNs
 from triggering.timeline.pulse_train import PulseTrain
 
 #: Share of a frame in the longest latency, which otherwise decays.
@@ -83,7 +85,7 @@ class Arrivals:
         self.longest_ns = 0.0
         self._usual_ns, self._sigma_ns = 0.0, _LEAST_NS
         self._latencies: deque[int] = deque(maxlen=_RECENT)
-        self._heard: deque[int] = deque(maxlen=LASTING)
+        self._heard: deque[tuple[HostNs, int]] = deque(maxlen=LASTING)  # arrivals and latencies
 
     def forget(self) -> None:
         """Learn the latencies anew: frames have another way, or another exposure."""
@@ -91,30 +93,41 @@ class Arrivals:
         self._latencies.clear()
         self._heard.clear()
 
-    def heard(self, latency_ns: int) -> None:
-        """Note the latency of a frame that has come, whether it will be accepted or not."""
-        self._heard.append(latency_ns)
+    def heard(self, arrival: HostNs, latency_ns: int) -> None:
+        """Note a frame that has come, whether it will be accepted or not."""
+        self._heard.append((arrival, latency_ns))
 
-    @property
-    def change_ns(self) -> float | None:
-        """By how much the last few frames all came later than usual; None: by different times, or nobody knows."""
-        if (
-            self.scatter
-            or len(self._heard) < LASTING
-            or max(self._heard) - min(self._heard) > self._train.period_ns / 4
-        ):
+    def change_ns(self, read: HostNs) -> float | None:
+        """By how much the last few frames all came later than usual; None: by different times, or nobody knows.
+
+        Args:
+            read: when the camera's clock was last read and went on as before. Frames that came later have perhaps the
+                time of a clock that was set.
+        """
+        if self.scatter or len(self._heard) < LASTING or read < self._heard[0][0]:
             return None
-        return sum(self._heard) / LASTING - self._usual_ns
+        late = [latency_ns for _, latency_ns in self._heard]
+        return sum(late) / LASTING - self._usual_ns if max(late) - min(late) <= self._train.period_ns / 4 else None
 
     def add(self, latency_ns: int) -> None:
         """Enter the latency of an accepted frame."""
         self.frames += 1
         self._learned += 1
         self._latencies.append(latency_ns)
-        if self._learned % _LEARN_EVERY == 0:
+        if self._has_changed():  # the median of times before and after it would be no time at all
+            self.forget()
+        if self._latencies and self._learned % _LEARN_EVERY == 0:
             self._learn()
         longer = latency_ns - self.longest_ns
         self.longest_ns += longer if longer > 0 else _DECAY * longer
+
+    def _has_changed(self) -> bool:
+        """Whether the last few accepted frames all came later, or sooner, than usual by the same."""
+        if self.scatter:
+            return False
+        last = list(islice(reversed(self._latencies), LASTING))
+        quarter = self._train.period_ns / 4
+        return max(last) - min(last) <= quarter < abs(sum(last) / LASTING - self._usual_ns)
 
     def _learn(self) -> None:
         """Learn median and scatter by quantiles, on which single late frames have no weight."""

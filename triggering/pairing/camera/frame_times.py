@@ -134,6 +134,11 @@ class FrameTimes:
         timed = (_timed(before, record, time),)
         return self.plausibility.judge(last_time, timed, read=self._is_read(record), others=others)
 
+    @property
+    def latency_change_ns(self) -> float | None:
+        """By how much the last frames all came later than usual; None: nobody knows, or the clock may have been set."""
+        return None if self._confirmed is None else self.arrivals.change_ns(self._confirmed.host)
+
     def learn_latencies_anew(self) -> None:
         """Believe the camera again: its frames come later or sooner than before, and nothing else is against it."""
         self.arrivals.forget()

@@ -187,9 +187,16 @@ class Plausibility:
         near = evidence.others.coincide(first.time)
         skips = near is None and (last is None or self._skips(last, first))  # alone, after pulses that it missed
         beside = last is not None and any(self._follows(last, later) for later in _since_last(waiting))
+        if last is not None and first.step is not None and self._periods_beyond(last, first):
+            if beside:  # the camera took each frame of the rhythm, and this one at another pulse than its time says
+                return Verdict.REJECTED
+            known = evidence.others.pulses(last, first.time)
+            if len(waiting) == 1 and known != first.step and not evidence.final:  # the next frame tells
+                return Verdict.WAITS
         if near or skips or beside:
             return Verdict.ACCEPTED
-        if near is None:  # alone: there is no frame beside which it could be set wrongly
+        if near is None and all(evidence.others.coincide(frame.time) is not False for frame in evidence.group):
+            # Alone, with those behind it: there is no frame beside which it could be set wrongly.
             return Verdict.ACCEPTED if evidence.final or len(evidence.group) >= _FEW else Verdict.WAITS
         return Verdict.WAITS if len(waiting) < _FEW else Verdict.REJECTED
 
@@ -207,11 +214,15 @@ class Plausibility:
 
     def _skips(self, last: HostNs, frame: Timed) -> bool:
         """Whether a frame comes whole periods later than its number says: the camera missed pulses between."""
+        return self._periods_beyond(last, frame) > 0
+
+    def _periods_beyond(self, last: HostNs, frame: Timed) -> int:
+        """By how many whole periods a frame comes later than its number says; 0: by none, or beside the rhythm."""
         if frame.step is None or frame.step <= 0:
-            return False
+            return 0
         beyond = frame.time - last - frame.step * self._train.period_ns
         periods = round(beyond / self._train.period_ns)
-        return periods > 0 and abs(beyond - periods * self._train.period_ns) <= self._train.tolerance_ns
+        return periods if abs(beyond - periods * self._train.period_ns) <= self._train.tolerance_ns else 0
 
     def _follows(self, before: HostNs, frame: Timed) -> bool:
         """Whether a frame comes as long after another one as its number says."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from types import MappingProxyType
 
@@ -11,12 +11,12 @@ import msgspec
 
 from rig.api.recordings import Counts, Recording, RecordingState, SessionChange, SessionFields
 from rig.api.statement import Level, Statement
-from rig.clocks import NS_PER_S, HostNs, UtcNs
+from rig.clocks import HostNs, UtcNs
 from rig.errors import SvevError
 from rig.transport.recorder_commands import StartRecording
 from rig.transport.recorder_reports import RecordingFinished, RecordingProgress, RecordingStarted
 from service.recordings.interruption import Interruption
-from service.recordings.listing import more_of
+from service.recordings.listing import more_of, utc
 
 #: How a recording ended: the recorder's report, or the error that ended it.
 Outcome = RecordingFinished | SvevError
@@ -44,7 +44,7 @@ class Account:
         """With the time of the first pulse, if it is new."""
         if self.started is not None or first_pulse is None:
             return self
-        return replace(self, started=datetime.fromtimestamp(first_pulse / NS_PER_S, UTC))
+        return replace(self, started=utc(first_pulse))
 
     def progressed(self, report: RecordingProgress) -> "Account":
         """After a report of the recorder."""

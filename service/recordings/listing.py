@@ -1,7 +1,7 @@
 """What a list says of a recording beside its log's own account."""
 
 from collections.abc import Mapping
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from itertools import islice
 from typing import Final
 
@@ -9,9 +9,10 @@ from recorder.log.extent import CONTINUES, CONTINUES_AFTER
 from rig.api.fields import LONGEST_LINE
 from rig.api.recordings import SessionFields
 from rig.api.start_list import COLUMN_NAME_MAX, COLUMNS_MAX
-from rig.clocks import NS_PER_S, UtcNs
+from rig.clocks import UtcNs
 from service.recordings.notes import NOTE_FIELD
 
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 #: Session fields of which the program itself makes something.
 _PROGRAMS: Final = frozenset(
     {*SessionFields.model_fields, "recording", "session", "tags", "favourite", CONTINUES, CONTINUES_AFTER}
@@ -34,5 +35,5 @@ def more_of(session: Mapping[str, str]) -> dict[str, str]:
 
 
 def utc(time: UtcNs) -> datetime:
-    """A time as the API gives it: to the microsecond."""
-    return datetime.fromtimestamp(time / NS_PER_S, UTC)
+    """A time as the API gives it: to the microsecond before it, so that who asks for what came since then finds it."""
+    return _EPOCH + timedelta(microseconds=time // 1000)

@@ -1,6 +1,6 @@
 """Points of the jumper in space: rays of all pulses, their start values and their equations."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -116,9 +116,20 @@ def points_of(
                 i = p * len(POINTS) + POINTS.index(name)
                 xy[i, j], covariance[i, j], seen[i, j] = point.xy, point.covariance, True
                 by_hand[i, j] = point.source is Source.BY_HAND
-    nothing = np.zeros((len(pulses), m, 3))
-    far = (np.repeat(nothing if each is None else each, len(POINTS), axis=0) for each in (shift, spread))
-    return Points(cameras, len(system.covariance), xy, covariance, seen, by_hand, *far)
+    ways = of_objects((shift, spread), (len(pulses), m), len(POINTS))
+    return Points(cameras, len(system.covariance), xy, covariance, seen, by_hand, *ways)
+
+
+def of_objects(ways: Iterable[Floats | None], size: tuple[int, int], objects: int) -> Iterator[Floats]:
+    """Ways (pulses objects, m, 3) of all objects, from those (pulses, m, 3) that all objects of a pulse share.
+
+    Args:
+        ways: of a pulse and a camera; None: nobody moves.
+        size: numbers of pulses and cameras.
+        objects: number of objects in a pulse.
+    """
+    for way in ways:
+        yield np.repeat(np.zeros((*size, 3)) if way is None else way, objects, axis=0)
 
 
 def rays(camera: PlacedCamera, xy: Floats) -> Floats:

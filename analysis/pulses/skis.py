@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.measurements.model import SIDES, PulseMeasurements, Source
 from analysis.pulses.least_squares import Equations
-from analysis.pulses.points import nearest
+from analysis.pulses.points import nearest, of_objects
 from analysis.scene.camera_arrays import stacked
 from analysis.scene.camera_system import CameraSystem, PlacedCamera
 from photogrammetry.geometry.rotation import cross
@@ -183,7 +183,6 @@ def skis_of(
         by_hand[i, j] = ski.source is Source.BY_HAND
     arrays, _ = stacked(cameras, len(system.covariance))
     ray = arrays.in_turn(n, k).rays(xy.reshape(-1, 2)).reshape(n, m, k, 3)
-    nothing = np.zeros((len(pulses), m, 3))
     return SkiLines(
         cameras,
         len(system.covariance),
@@ -193,7 +192,7 @@ def skis_of(
         common,
         _long(xy, weight),
         by_hand,
-        *(np.repeat(nothing if each is None else each, len(SIDES), axis=0) for each in (shift, spread)),
+        *of_objects((shift, spread), (len(pulses), m), len(SIDES)),
     )
 
 

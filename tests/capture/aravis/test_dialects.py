@@ -5,7 +5,8 @@ features are asked what they are.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import pytest
 from simrig.gige.registers.genicam import describe
 from simrig.gige.registers.makers import DIALECTS, Maker, registers_of
 from simrig.gige.registers.register_table import Identity, all_registers
-from tests.capture.aravis.described import described
+from tests.capture.aravis.described import Described, described
 from tests.support.loopback import Loopback
 
 _IDENTITY = Identity("1", "K2", 0x7F00000B, (640, 480), 1_000_000_000, resend=True)
@@ -329,25 +330,31 @@ def _description(kind: Kind) -> bytes:
     return xml.replace("<Port ", kind.nodes + "<Port ").encode()
 
 
-@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS.keys())
-def test_a_camera_is_set_up_whatever_another_program_left(kind: Kind, tmp_path: Path, loopback: Loopback) -> None:
+@contextmanager
+def _left_by_another_program(kind: Kind, tmp_path: Path, loopback: Loopback) -> Iterator[Described]:
+    """A camera of this kind, with the values that another program has left."""
     path = tmp_path / "dialect.xml"
     path.write_bytes(_description(kind))
     with described(path, tmp_path, loopback) as made:
         made.leave(kind.left)
         if kind.locked is not None:
             made.lock(*kind.locked)
-        with made.opened(**kind.settings) as camera:
-            features = camera._features
-            found: dict[str, str | float | None] = {}
-            for name in kind.wanted:
-                if name in features.entries("GainSelector"):  # asked last: it changes what is selected
-                    assert features.choose("GainSelector", name)
-                    found[name] = features.number("Gain")
-                else:
-                    value = features._value(name)
-                    found[name] = round(value, 5) if isinstance(value, float) else value
-            notices = camera.notices()
+        yield made
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS.keys())
+def test_a_camera_is_set_up_whatever_another_program_left(kind: Kind, tmp_path: Path, loopback: Loopback) -> None:
+    with _left_by_another_program(kind, tmp_path, loopback) as made, made.opened(**kind.settings) as camera:
+        features = camera._features
+        found: dict[str, str | float | None] = {}
+        for name in kind.wanted:
+            if name in features.entries("GainSelector"):  # asked last: it changes what is selected
+                assert features.choose("GainSelector", name)
+                found[name] = features.number("Gain")
+            else:
+                value = features._value(name)
+                found[name] = round(value, 5) if isinstance(value, float) else value
+        notices = camera.notices()
     assert found == dict(kind.wanted)
     assert len(notices) == len(kind.notices), notices
     for notice, words in zip(notices, kind.notices, strict=True):
@@ -356,12 +363,7 @@ def test_a_camera_is_set_up_whatever_another_program_left(kind: Kind, tmp_path: 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS.keys())
 def test_what_another_program_left_is_there_again_after_a_trial(kind: Kind, tmp_path: Path, loopback: Loopback) -> None:
-    path = tmp_path / "dialect.xml"
-    path.write_bytes(_description(kind))
-    with described(path, tmp_path, loopback) as made:
-        made.leave(kind.left)
-        if kind.locked is not None:
-            made.lock(*kind.locked)
+    with _left_by_another_program(kind, tmp_path, loopback) as made:
         before = made.memory()
         with made.opened(set_back=True, **kind.settings):
             assert made.memory() != before

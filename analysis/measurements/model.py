@@ -14,8 +14,10 @@ from rig.pulse import PulseNumber
 
 #: P1 helmet, P2 hip, P3 right and P4 left binding (Fig. 6).
 POINTS: Final = ("P1", "P2", "P3", "P4")
-#: The skis; the binding of `right` is P3, that of `left` P4.
+#: The skis.
 SIDES: Final = ("right", "left")
+#: The binding of each ski.
+BINDING_OF: Final = {"right": "P3", "left": "P4"}
 
 
 class Source(StrEnum):

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
-from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, PulseMeasurements
+from analysis.measurements.model import BINDING_OF, POINTS, SIDES, JumpMeasurements, PulseMeasurements
 from analysis.motion.smoother import Motion
 from analysis.pulses.least_squares import Condition
 from analysis.result.fates import Fate, ImageFate, PartFate
@@ -11,7 +11,6 @@ from analysis.result.model import JumperState, SmoothedState
 from analysis.scene.camera_system import CameraSystem
 from rig.pulse import PulseNumber
 
-_BINDINGS: Final = {"right": "P3", "left": "P4"}  # a ski is in sight where its binding is
 _REFUSED: Final = {
     Condition.UNDETERMINED: Fate.UNDETERMINED,
     Condition.IMPOSSIBLE: Fate.DISAGREE,
@@ -61,7 +60,8 @@ def _fate(
     left_out: Collection[tuple[PulseNumber, str, str]],
     system: CameraSystem,
 ) -> PartFate:
-    place = None if smoothed is None else smoothed.points.get(_BINDINGS.get(what, what))
+    # A ski is in sight where its binding is.
+    place = None if smoothed is None else smoothed.points.get(BINDING_OF.get(what, what))
     images: dict[str, ImageFate] = {}
     for name, camera in system.cameras.items():
         if name in used:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from analysis.identification.space.body import USUAL, implausibility, log_spread
-from analysis.measurements.model import POINTS, SIDES, ImageMeasurements, JumpMeasurements
+from analysis.measurements.model import BINDING_OF, POINTS, SIDES, ImageMeasurements, JumpMeasurements
 from analysis.motion.quantities import NEEDS
 from analysis.result.model import QUANTITIES, JumperState, SmoothedState, Status
 from rig.arrays import Floats
@@ -26,7 +26,7 @@ UNTOLD: Final = phrase(
     "four, and no binding on its ski; look at the overlay, and give the markers more contrast",
 )
 _BODY: Final = ("P1", "P2")
-_BINDINGS: Final = (("P3", "right"), ("P4", "left"))
+_BINDINGS: Final = tuple((binding, side) for side, binding in BINDING_OF.items())
 _FEWEST: Final = 3  #: pulses that bear a name out; in one or two it may be a coincidence
 _AHEAD_M: Final = 0.1  #: the feet of a jumper are side by side; of what lies farther ahead one is no binding
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.measurements.model import ImageMeasurements
+from analysis.measurements.model import BINDING_OF, ImageMeasurements
 from analysis.report.course import origin_of
 from analysis.result.fates import ImageFate, PartFate
 from analysis.result.model import JumperState, Status
@@ -97,7 +97,7 @@ def stick_lines(state: JumperState) -> dict[str, Floats]:
         lines["body"] = np.stack(body)
     if origin is not None:
         lines["feet"] = np.stack((known["P3"], known["P4"]))
-    for side, binding in (("right", "P3"), ("left", "P4")):
+    for side, binding in BINDING_OF.items():
         ski = state.skis.get(side)
         if ski is not None and binding in known:
             half = SKI_LENGTH_M / 2 * ski.direction

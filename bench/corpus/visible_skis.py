@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cameras.frames import LogFrames
+from analysis.measurements.model import BINDING_OF
 from bench.analysis.hill_logs import HillLog
 from bench.corpus.draws import Scene
 from rig.arrays import Flags, Floats
@@ -28,7 +29,6 @@ _PIECE_PX: Final = 8
 _SIGMAS: Final = 3.0
 _SHARE: Final = 0.5
 _MAD_TO_SIGMA: Final = 1.4826
-_BINDINGS: Final = {"right": "P3", "left": "P4"}
 
 
 def visible_skis(scene: Scene, log: HillLog) -> dict[int, dict[str, int]]:
@@ -44,14 +44,14 @@ def visible_skis(scene: Scene, log: HillLog) -> dict[int, dict[str, int]]:
     for number, frames in LogFrames(log.path).frames(set(present)):
         shown = [(image.astype(np.float32), cameras[name]) for name, image in frames.items()]
         found[int(number)] = {
-            side: sum(_seen(image, camera, present[number], side) for image, camera in shown) for side in _BINDINGS
+            side: sum(_seen(image, camera, present[number], side) for image, camera in shown) for side in BINDING_OF
         }
     return found
 
 
 def _seen(image: _Image, camera: Projection, state: Mapping[str, Any], side: str) -> bool:
     """Whether a person would see a ski in an image."""
-    binding, direction = np.array(state["points"][_BINDINGS[side]]), np.array(state["skis"][side]["direction"])
+    binding, direction = np.array(state["points"][BINDING_OF[side]]), np.array(state["skis"][side]["direction"])
     distance = float(camera.distance(binding))
     if distance <= 0:
         return False

@@ -6,7 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.candidates.model import PulseCandidates, SecondLook
-from analysis.identification.markers.markers import Markers, follow_further, follow_markers
+from analysis.identification.markers.markers import (
+    Markers,
+    follow_further,
+    follow_markers,
+    settled_again,
+    without_bindings,
+)
 from analysis.identification.markers.refinement import only_worn, refined
 from analysis.identification.markers.synchrony import lateness
 from analysis.identification.over_time.flights import Flight, find_flights, find_tracks
@@ -15,6 +21,7 @@ from analysis.identification.ski_bars import MeasuredSkis, measure_skis
 from analysis.identification.space.body import BINDINGS
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
+from analysis.identification.unmarked_skis import beside_skis, off_skis, shown_by_two
 from analysis.measurements.model import (
     POINTS,
     ImageMeasurements,
@@ -164,9 +171,27 @@ class Sighting:
         skis: Sequence[MeasuredSkis] = [{}] * len(window)
         if look is not None:
             skis = measure_skis(views, window, flight, places, look, steps)
+            seen = np.any(markers.assigned.rays >= 0, axis=(1, 2))
+            if not briefly and shown_by_two(skis) < np.count_nonzero(seen):  # half of two skis each
+                markers, skis = self._by_skis(markers, skis, look, steps)
         pulses = [named_pulse(views, c, markers.assigned.rays[t], skis[t]) for t, c in enumerate(window.candidates)]
         found = [t for t, pulse in enumerate(pulses) if any(i.points or i.skis for i in pulse.images.values())]
         return tuple(pulses[found[0] : found[-1] + 1])
+
+    def _by_skis(
+        self, markers: Markers, skis: Sequence[MeasuredSkis], look: SecondLook, steps: Flags
+    ) -> tuple[Markers, Sequence[MeasuredSkis]]:
+        """Markers and skis where bindings have led to few: by skis that are sought without them, if these are more."""
+        views, window, flight = self.views, self.window, self.flight
+        beside = beside_skis(views, window, flight, markers, look)
+        if beside is None:
+            return markers, skis
+        others = measure_skis(views, window, flight, beside.places(BINDINGS), look, steps)
+        if shown_by_two(others) <= shown_by_two(skis):
+            return markers, skis
+        markers = follow_further(views, window, flight, settled_again(views, window, flight, beside), look)
+        markers = refined(views, window, flight, markers, self.appearance, look)
+        return without_bindings(markers, off_skis(views, window, markers, others)), others
 
 
 def appearance_of(views: Views, candidates: Sequence[PulseCandidates], flight: Flight) -> Appearance:

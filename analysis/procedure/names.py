@@ -28,24 +28,27 @@ UNTOLD: Final = phrase(
 _BODY: Final = ("P1", "P2")
 _BINDINGS: Final = tuple((binding, side) for side, binding in BINDING_OF.items())
 _FEWEST: Final = 3  #: pulses that bear a name out; in one or two it may be a coincidence
+_SIGMAS: Final = 3.0  #: of the angle between both skis, so that it is beyond doubt
 _AHEAD_M: Final = 0.1  #: the feet of a jumper are side by side; of what lies farther ahead one is no binding
 
 
 def told_names(states: Sequence[JumperState]) -> frozenset[str]:
-    """The names of P1 to P4 that the raw states of a jump bear out; all of them if a person measured any.
+    """The names of points and skis that the raw states of a jump bear out; all points if a person measured any.
 
     - Helmet and hip by each other: nothing else that goes with a body is as far from each other in that direction.
     - A binding by its ski. Where hardly any ski was found, bindings by all four at once, if they look like a body.
     - The helmet without the hip, or the other way round, by told bindings: it is where it must be beside them, and in
       several pulses the other one would hardly be there. A hip in the crouch on the table may as well be a helmet, in
       flight a helmet is farther from the bindings; and never is a hip where a helmet is then.
+    - Skis by each other, where the left one points to the left of the right one: nothing else opens forwards like that.
+      A binding tells its own ski and the other one.
 
     Bindings of which one lies ahead of the other along the skis are not told: one of them is something else. Nor is a
     binding that lies, as seen from helmet or hip, where the other one is expected: of a single one both may be said.
     """
     points = [point for state in states for point in state.points.values() if point is not None]
     if any(point.status is Status.BY_HAND for point in points):
-        return frozenset(POINTS)
+        return frozenset((*POINTS, *SIDES))
     body = _Body(states)
     told: set[str] = set()
     if body.looks(_BODY):
@@ -65,7 +68,21 @@ def told_names(states: Sequence[JumperState]) -> frozenset[str]:
         for name, other in (_BODY, _BODY[::-1]):
             if any(body.looks((binding, name)) and body.rather((binding, name), other) for binding in bindings):
                 told.add(name)
+    if any(binding in told for binding, _ in _BINDINGS) or _opens(states):
+        told.update(SIDES)
     return frozenset(told)
+
+
+def _opens(states: Sequence[JumperState]) -> bool:
+    """Whether skis open forwards, beyond doubt in several pulses, and in most of those that show both."""
+    opening = []
+    for state in states:
+        right, left = (state.skis[side] for side in SIDES)
+        if right is not None and left is not None:
+            apart = (left.heading.value - right.heading.value + 180.0) % 360.0 - 180.0
+            opening.append(apart / float(np.hypot(left.heading.sigma, right.heading.sigma)))
+    beyond = np.sum(np.array(opening) > _SIGMAS) >= _FEWEST
+    return bool(beyond and np.median(opening) > 0.0)
 
 
 def _ahead_m(states: Sequence[JumperState]) -> float:
@@ -101,9 +118,8 @@ def untold_line(states: Sequence[JumperState], told: Collection[str]) -> Phrase 
 
 
 def untold_parts(told: Collection[str]) -> frozenset[str]:
-    """Points and skis that are not given where only some names are told; no ski, where no binding tells which it is."""
-    given = {*told, *(SIDES if any(binding in told for binding, _ in _BINDINGS) else ())}
-    return frozenset((*POINTS, *SIDES)) - given
+    """Points and skis that are not given where only some names are told."""
+    return frozenset((*POINTS, *SIDES)).difference(told)
 
 
 def only_told(jump: JumpMeasurements, told: Collection[str]) -> JumpMeasurements:

@@ -33,7 +33,7 @@ _SOUGHT_SIGMAS: Final = 2.4
 _COARSE, _FINE = np.radians(4.0), np.radians(1.0)
 _AROUND: Final = 5  # fine steps to each side of the coarse direction
 _TURNS: Final = 0.6  # of the steps of the directions: those of the lines in an image
-_SLOPE_RAD_S, _HEADING_RAD_S = 1.5, 0.6  # how fast skis turn
+SLOPE_RAD_S, HEADING_RAD_S = 1.5, 0.6  #: how fast skis turn
 #: Lines are tried up to so many standard deviations beside a binding, in such steps; and what is so far from a line is
 #: beside the ski, m.
 _ASIDE_SIGMAS, _STEP_M, _BESIDE_M = 1.8, 0.03, 0.09
@@ -155,7 +155,7 @@ def _likeliest(scores: Floats, time_s: Floats, slope: Floats, heading: Floats) -
     for score, dt in zip(scores[1:], np.diff(time_s), strict=True):
         turned = [
             -((angle[:, None] - angle) ** 2) / (2 * ((rate * dt) ** 2 + (_COARSE / 2) ** 2))
-            for angle, rate in ((slope, _SLOPE_RAD_S), (heading, _HEADING_RAD_S))
+            for angle, rate in ((slope, SLOPE_RAD_S), (heading, HEADING_RAD_S))
         ]
         by_slope = best[None] + turned[0][:, :, None]
         by_heading = by_slope.max(axis=1)[:, None] + turned[1]
@@ -236,6 +236,67 @@ class _Bundle:
     turns: Floats
     step_m: float
     sigma_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineTable:
+    """What the lines around a place tell in an image.
+
+    Attributes:
+        xy: (2,) the place, px.
+        scale: px per m.
+        turns: (n,) of the lines, rad, over half a turn in equal steps.
+        sums: (n, lines side by side, samples + 1) logarithms, from the first sample of a line to each.
+    """
+
+    xy: Floats
+    scale: float
+    turns: Floats
+    sums: Floats
+
+    def nearest(self, turn: Floats) -> tuple[Integers, Floats]:
+        """The nearest turns (k,) of lines at angles (k,), and their unit vectors (k, 2)."""
+        i = np.rint((turn - self.turns[0]) / (self.turns[1] - self.turns[0])).astype(int) % len(self.turns)
+        at = self.turns[i]
+        return i, np.stack((np.cos(at), np.sin(at)), axis=-1)
+
+    def between(self, turn: Integers, u: Floats, first: Floats, last: Floats) -> tuple[Floats, Flags]:
+        """Sums from `first` to `last` (..., px along) of the best of three lines at u px beside the place.
+
+        Returns:
+            Sums (...), and whether the lines were looked at (...).
+        """
+        side = (self.sums.shape[1] - 1) // 2
+        line = np.rint(u / (_STEP_M * self.scale)).astype(int) + side
+        inside: Flags = (line >= 1) & (line < self.sums.shape[1] - 1)
+        line = np.clip(line, 1, self.sums.shape[1] - 2)
+        begin, end = (
+            np.clip(np.rint((r / self.scale - _REACH_M[0]) / _ALONG_M).astype(int), 0, self.sums.shape[2] - 1)
+            for r in (first, last)
+        )
+        near = [self.sums[turn, line + i, end] - self.sums[turn, line + i, begin] for i in (-1, 0, 1)]
+        return np.max(near, axis=0), inside
+
+
+def line_table(
+    view: SkiView, place: Floats, step: float, reach_m: float, taken: tuple[Floats, Floats] | None
+) -> LineTable | None:
+    """Lines of all turns through a place and beside it; None where the image does not show it.
+
+    Args:
+        view: of a camera.
+        place: (3,) m, as the camera saw it.
+        step: between directions in space, rad.
+        reach_m: how far beside the place lines are looked at.
+        taken: as of `_Place`.
+    """
+    xy = view.camera.project(place)
+    if not np.isfinite(xy).all():
+        return None
+    scale = float(view.camera.camera.interior[0] / np.linalg.norm(place - view.camera.position))
+    turns = np.pi * np.arange(n := int(np.ceil(np.pi / (_TURNS * step)))) / n
+    lines = _line_sums(view, _Bundle(xy, scale, turns, _STEP_M, reach_m / _ASIDE_SIGMAS), taken)
+    return None if lines is None else LineTable(xy, scale, turns, lines[0])
 
 
 def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | None) -> tuple[Floats, Floats] | None:

@@ -90,6 +90,28 @@ def settled_again(views: Views, window: Window, flight: Flight, markers: Markers
     return _settled(views, window, flight, markers.assigned.xyz, markers.assigned.covariance)
 
 
+def with_bindings(
+    window: Window, flight: Flight, markers: Markers, steps: Integers, xyz: Floats, covariance: Floats
+) -> Markers:
+    """The markers with other places of the bindings, which no spots show.
+
+    Args:
+        window: t pulses.
+        flight: of the jumper.
+        markers: whose helmet and hip are kept.
+        steps: (s,) pulses at which the bindings have places.
+        xyz: (s, 2, 3) of these.
+        covariance: (s, 2, 3, 3) of them.
+    """
+    rays = markers.assigned.rays.copy()
+    places, spread = markers.assigned.xyz.copy(), markers.assigned.covariance.copy()
+    rays[:, BINDINGS], places[:, BINDINGS] = -1, np.nan
+    for i, marker in enumerate(BINDINGS):
+        places[steps, marker], spread[steps, marker] = xyz[:, i], covariance[:, i]
+    predicted = predict(window.time_s, places, spread, _parts(flight), _MIXING)
+    return Markers(Assigned(rays, places, spread), predicted)
+
+
 def _settled(views: Views, window: Window, flight: Flight, xyz: Floats, covariance: Floats) -> Markers:
     """The markers after so many turns that nothing changes; xyz (t, 4, 3) with covariance to begin with.
 
@@ -104,7 +126,7 @@ def _settled(views: Views, window: Window, flight: Flight, xyz: Floats, covarian
         markers = _assigned(views, window, flight, *_renamed(markers.assigned, names))
     else:
         names = _names(window, flight, markers.assigned)
-    return _without(markers, names != _AS_THEY_ARE)
+    return without_bindings(markers, names != _AS_THEY_ARE)
 
 
 def _names(window: Window, flight: Flight, assigned: Assigned) -> Integers:
@@ -150,7 +172,7 @@ def _renamed(assigned: Assigned, names: Integers) -> tuple[Floats, Floats]:
     return xyz, covariance
 
 
-def _without(markers: Markers, left_out: Flags) -> Markers:
+def without_bindings(markers: Markers, left_out: Flags) -> Markers:
     """The markers without points of some bindings, left_out (t, 2), and without single rays that these have named."""
     out = np.zeros(markers.assigned.rays.shape[:2], bool)
     for place, marker in enumerate(BINDINGS):

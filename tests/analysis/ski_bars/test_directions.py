@@ -1,21 +1,15 @@
 """The directions of skis are found from their bindings alone, through the pulses."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
-from analysis.candidates.foreground.background import Background
 from analysis.identification.markers.markers import ANYWHERE_M
 from analysis.identification.ski_bars import Bindings
-from analysis.scene.static_image import StaticImage
 from analysis.ski_bars.directions import Directions, seek_directions
-from analysis.ski_bars.pixels import SkiView
-from bench.analysis.simulated import true_cameras
 from rig.arrays import Floats
-from tests.analysis.digitizing.following.tracked_hill import NAMES, RATE_HZ, TrackedHill, hill
+from tests.analysis.digitizing.following.tracked_hill import RATE_HZ, TrackedHill, hill
+from tests.analysis.ski_bars.hill_views import views_of
 
-SYSTEM = true_cameras()
 BINDING_M = 0.01
 AXES = np.diag((1.0, 1.0, 1.0))  # the hill's X axis leads forward
 
@@ -27,17 +21,7 @@ def of(request: pytest.FixtureRequest) -> TrackedHill:
 
 def _sought(of: TrackedHill, pulses: list[int], *, empty: bool = False, bare: bool = False) -> Directions:
     """Of some pulses; `empty`: in images without a jumper, `bare`: the left binding wears no marker."""
-    backgrounds = {}
-    for name in NAMES:
-        grey = np.median([of.frames(p)[name] for p in (30, 31, 78, 79)], axis=0).astype(np.float32)
-        backgrounds[name] = Background(StaticImage(name, grey, np.full_like(grey, 2.0), 4))
-    views = [
-        [
-            SkiView(SYSTEM[name], partial(backgrounds[name].part, of.frames(30 if empty else pulse)[name]), np.zeros(3))
-            for name in NAMES
-        ]
-        for pulse in pulses
-    ]
+    views = views_of(of, [30] * len(pulses) if empty else pulses)
     rng = np.random.default_rng(5)
     bindings = np.array([[of.truth[p]["points"][label] for label in ("P3", "P4")] for p in pulses])
     bindings = bindings + rng.normal(0, BINDING_M, bindings.shape)

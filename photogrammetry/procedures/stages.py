@@ -89,11 +89,11 @@ def search_block(network: Network) -> Search:
         start = _start_by_survey(cleaned, None)
         if start is None:
             raise
-        return Search(cleaned, start, tuple(gone), (stage, _other_block(str(error))))
+        return _without_block(network, Search(cleaned, start, tuple(gone), (stage, _other_block(str(error)))))
     start = None if fit is None else carried(cleaned, block, free, fit.estimate.transform)
     if start is not None and second.findings and (other := _start_by_survey(cleaned, start)) is not None:
         words = "; ".join(finding.message for finding in second.findings)
-        return Search(cleaned, other, tuple(gone), (stage, _other_block(words)))
+        return _without_block(network, Search(cleaned, other, tuple(gone), (stage, _other_block(words))))
     removed = (*gone, *wrong)
     left = without_removed(network, removed)
     start = None if fit is None else carried(left, block, free, fit.estimate.transform)
@@ -130,6 +130,25 @@ def _other_block(words: str) -> Stage:
         StageName.SIMILARITY,
         f"left out: the images alone form a block other than that of the survey, with which they agree ({words})",
     )
+
+
+def _without_block(network: Network, search: Search) -> Search:
+    """What is left to the third stage where the free block is not that of the survey.
+
+    Observations that do not fit the other block may fit the survey: they take part again, if all then agree.
+
+    Args:
+        network: with all of its observations.
+        search: what is left without those that the free adjustment took out.
+    """
+    if not search.removed:
+        return search
+    start = _start_by_survey(network, None)
+    if start is None:
+        return search
+    free, similarity = search.stages
+    again = replace(free, words=f"{free.words}; what did not fit this block takes part again", findings=())
+    return Search(network, start, (), (again, similarity))
 
 
 def constrained_stage(search: Search) -> tuple[Outcome, Stage]:

@@ -92,12 +92,16 @@ def orient_relatively(first: ArrayLike, second: ArrayLike, c_first: float, c_sec
     if len(u) < 5:
         raise BadInputError(f"a relative orientation has {len(u)} homologous points: give at least five")
     rounding = len(u) * (_ROUNDING * 0.5 * (c_first + c_second)) ** 2
-    good, minima = _robust_minima(*_candidates(u / c_first, v / c_second), u, v)
+    none_there = BadInputError(
+        "homologous points allow no relative orientation: check point numbers and principal distance"
+    )
+    rotations, bases = _candidates(u / c_first, v / c_second)
+    if not len(rotations):  # the closed solutions of five points may all be complex
+        raise none_there
+    good, minima = _robust_minima(rotations, bases, u, v)
     solutions = _solutions(*minima, u[good], v[good], rounding)
     if not solutions or solutions[0].in_front < 0.5:
-        raise BadInputError(
-            "homologous points allow no relative orientation: check point numbers and principal distance"
-        )
+        raise none_there
     limit = max(_POSSIBLE * solutions[0].square_sum, rounding)
     head, *others = (
         replace(s, residuals=_conditions(s.rotation[None], s.base[None], u, v)[0][0])

@@ -133,6 +133,22 @@ def test_a_block_that_only_the_images_allow_does_not_speak_against_the_survey(se
     assert _off(case, orientation.outcome.adjustment) < 5.0
 
 
+@pytest.mark.parametrize("blunder_px", [0.0, 15.0])
+def test_observations_that_only_another_block_contradicts_are_used(blunder_px: float) -> None:
+    """The free block is none of the survey's, and in it five sound image points are gross errors."""
+    rng = np.random.default_rng([5511, 48])
+    distance, ties = rng.uniform(10.0, 45.0), int(rng.integers(0, 6))
+    case = planar(rng, 3, distance, ties=ties)
+    case.network.observations.xy[4, 0] += blunder_px  # G4 in C0
+    orientation = orient(case.network)
+    gone = [
+        case.network.points[one.network.observations.point[one.blunder.suspect.index]].name
+        for one in orientation.outcome.removed
+    ]
+    assert gone == (["G4"] if blunder_px else [])
+    assert _off(case, orientation.outcome.adjustment) < 5.0
+
+
 def _is_wrong(case: Planar) -> bool:
     """Whether a field gets poses that are wrong, or another failure than that nothing decides."""
     try:

@@ -110,6 +110,15 @@ def test_bad_input_is_named() -> None:
         orient_relatively(np.zeros((4, 2)), np.zeros((4, 2)), 1000.0, 1000.0)
 
 
+@pytest.mark.parametrize("seed", [268, 2900])
+def test_five_points_whose_closed_solutions_are_all_complex_are_refused(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    first = rng.uniform(-300.0, 300.0, (5, 2))
+    second = first + rng.normal(0.0, 20.0, (5, 2))
+    with pytest.raises(BadInputError, match="homologous points allow no relative orientation"):
+        orient_relatively(first, second, 1000.0, 1000.0)
+
+
 def test_equal_input_gives_equal_output() -> None:
     rng = np.random.default_rng(8)
     cameras, points = _pair(rng, 20, False)

@@ -64,6 +64,8 @@ def _interior(path: Path) -> Part:
             raise BadInputError(f"{line.place}: the principal distance is missing; write camera, c, x0, y0, ...")
         if abs(line.values["c"]) < _SHORTEST_MM:
             raise BadInputError(f"{line.place}: c = {line.values['c']:g} mm is no principal distance; correct it")
+        if "x0" not in line.values:
+            _require_single(line)
         entry: dict[str, Any] = {name: line.values[name] for name in (*INTERIOR, "r0") if name in line.values}
         cameras[_new(line, "camera", cameras)] = entry | {"c": abs(entry["c"]), "distortion": "measured"}
     return Part(str(path), ImageFrame.METRIC, cameras, notes=(*notes, f"{path.name}: c is positive in the network"))
@@ -75,11 +77,8 @@ def _poses(path: Path) -> Part:
     for line in lines:
         entry: dict[str, Any] = {"camera": line.labels.get("camera")}
         entry["X0"] = line.triple(("x0", "y0", "z0"))
-        if entry["X0"] is None and _SEPARATING.search(str(entry["camera"])):
-            raise BadInputError(
-                f"{line.place}: {entry['camera']!r} may be several cells; write one separator in all lines, and "
-                '"..." around names that hold it'
-            )
+        if entry["X0"] is None:
+            _require_single(line)
         for unit, factor in ANGLE_UNITS.items():
             angles = line.triple([f"{angle}_{unit}" for angle in ANGLES])
             if angles is not None and "R" in entry:
@@ -91,6 +90,16 @@ def _poses(path: Path) -> Part:
         without = f"{path.name}: no angles (columns omega_deg, phi_deg, kappa_deg, or _gon, _rad): R is found anew"
         notes = (*notes, without)
     return Part(str(path), ImageFrame.METRIC, images=images, notes=notes)
+
+
+def _require_single(line: Line) -> None:
+    """Refuse a line without coordinates where the separator of other cells stands in a name."""
+    for name in line.labels.values():
+        if _SEPARATING.search(name):
+            raise BadInputError(
+                f"{line.place}: {name!r} may be several cells; write one separator in all lines, and "
+                '"..." around names that hold it'
+            )
 
 
 def _image_points(path: Path, sigma: float | None) -> Part:

@@ -20,7 +20,7 @@ _QUOTED: Final = re.compile(r'"(?:[^"]|"")*"')
 _BLANKS: Final = re.compile(r'("(?:[^"]|"")*")|[ \t]+')
 _COMMENT: Final = ("#", "!")
 _SEPARATORS: Final = (";", "\t", ",", " ")
-_DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+")
+_DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?", re.ASCII)
 _THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _NUMBER: Final = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?", re.ASCII)
 
@@ -135,7 +135,7 @@ def _seen(text: str, path: Path) -> str:
 
 
 def _assumed(text: str, path: Path) -> str:
-    word = next(word for word in re.split(r"[\s;,]+", text) if not word.isascii())
+    word = next(word for word in re.split(r"[ \t\r\n;,]+", text) if not word.isascii())  # \s would split at \xa0
     return f"{path.name}: is no UTF-8, taken as Windows-1252 (Latin-1): look whether {word!r} is right"
 
 

@@ -46,8 +46,11 @@ _MORE: Final[Mapping[str, frozenset[str]]] = {
     ".eor": frozenset(f"{angle}_{unit}" for angle in ANGLES for unit in ANGLE_UNITS),
 }
 _FEWEST_NAMED: Final = 3  # columns, in a comment that is a head
+_AFTER_MARK: Final = re.compile(r"[^\s#!]\S*")  # words of a comment
 #: Blanks that may be an empty cell.
 _WIDE: Final = re.compile(r"^[ \t]|[ \t]{2}|[ \t]$")
+#: Sigmas of one point that differ by more: no survey knows one coordinate so much better than another.
+_UNLIKE: Final = 10.0
 _WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
 #: No principal point is so far from the middle of a picture: mm, and as a share of c.
 _FAR_MM: Final = 1.0
@@ -107,16 +110,17 @@ def read_lines(path: Path) -> tuple[list[Line], tuple[str, ...]]:
         _check_cameras(file.separator, body)
     if head is None:
         _check_unnamed(file.separator, words, path)
-        if file.separator in (" ", ",") and "sx" in columns:
-            _check_even(body, columns)
         if "sx" in columns:
+            _check_even(body, columns)
             _check_first(file.separator, body, columns, path)
-    elif file.separator == " ":
-        _check_hidden(body, columns)
+        if "sx" in columns and file.separator in (" ", ","):
+            _check_sigmas(body, cells)
+    if file.separator == " " and (head is not None or ending == ".eor"):
+        _check_hidden(head, body, columns)
     if file.separator == " " and (ending == ".ior" or (head is None and "sx" in columns)):
         _check_blanks(body, columns)
     lines = [_line(row, each, points, ending) for row, each in zip(body, cells, strict=True)]
-    hidden = sum(row.comment and sum(is_number(word) for word in row.cells) >= _FEWEST_NAMED for row in file.rows)
+    hidden = sum(row.comment and row is not head and _may_be_data(row, body[0], file.separator) for row in file.rows)
     left_out = (f"{path.name}: {hidden} lines of numbers are comments (# or !) and left out",) if hidden else ()
     return lines, (*file.notes, *left_out)
 
@@ -129,6 +133,13 @@ def _head(file: Rows, ending: str) -> tuple[Row | None, list[Row]]:
     before = [row for row in file.rows[: file.rows.index(body[0])] if row.comment] if body else []
     fewest = min(_FEWEST_NAMED, len(_USUAL[ending]) - 1)
     return next((row for row in reversed(before) if _is_head(row.cells, ending, fewest=fewest)), None), body
+
+
+def _may_be_data(comment: Row, line: Row, separator: str) -> bool:
+    """Whether a comment looks like a line: by its numbers, or by as many cells; words have blanks between them too."""
+    count = sum(is_number(word) for word in comment.cells)
+    fewest = 1 if separator == " " else 0
+    return count >= _FEWEST_NAMED or (count >= fewest and len(comment.cells) == len(line.cells))
 
 
 def _is_head(words: Sequence[str], ending: str, fewest: int) -> bool:
@@ -231,8 +242,19 @@ def _check_even(body: Sequence[Row], columns: Sequence[str]) -> None:
         row = next(row for row in body if len(row.cells) != len(body[0].cells))
         raise BadInputError(
             f"{row.place}: {len(row.cells)} cells, and {len(body[0].cells)} in the first line: a cell may be empty, or "
-            "a name be taken for two; separate them by semicolons, or name the columns in the first line"
+            "a name be taken for two; name the columns in the first line, and leave empty cells between semicolons"
         )
+
+
+def _check_sigmas(body: Sequence[Row], cells: Sequence[Mapping[str, str]]) -> None:
+    """Refuse lines without named columns in which a sigma is so large beside another that it may be a coordinate."""
+    for row, each in zip(body, cells, strict=True):
+        sigmas = [_number(word) for name, word in each.items() if name in SIGMAS and is_number(word)]
+        if len(sigmas) > 1 and max(sigmas) > _UNLIKE * min(sigmas) > 0.0:
+            raise BadInputError(
+                f"{row.place}: sigmas of {min(sigmas):g} and {max(sigmas):g}, of which one may be a coordinate behind "
+                "a name of two cells; name the columns in the first line"
+            )
 
 
 def _check_blanks(body: Sequence[Row], columns: Sequence[str]) -> None:
@@ -274,8 +296,9 @@ def _check_first(separator: str, body: Sequence[Row], columns: Sequence[str], pa
     """
     behind = columns.index("name") + 1  # of image points the image stands before the name
     fewest = behind + 4  # cells that are too few for a longer name
-    first = [row for row in body if all(row.cells[fewest - 1 :] or [""]) and row.cells[behind].isdecimal()]
-    alike = len(body) > 1 and len({row.cells[columns.index("sx") :] for row in body}) == 1
+    first = [row for row in body if len(row.cells) >= fewest and row.cells[behind].isdecimal()]
+    sigmas = {row.cells[columns.index("sx") :] for row in body}
+    alike = len(body) > 1 and len(sigmas) == 1 and all(next(iter(sigmas)))
     unsure = next((row for row in first if not _is_sure(row, behind, columns, alike=alike)), None)
     if unsure is None:
         return
@@ -331,17 +354,35 @@ def _check_names(separator: str, body: Sequence[Row]) -> None:
             raise _may_be_one(more, second, separator, row)
 
 
-def _check_hidden(body: Sequence[Row], columns: Sequence[str]) -> None:
+def _check_hidden(head: Row | None, body: Sequence[Row], columns: Sequence[str]) -> None:
     """Refuse lines in which blanks may hide an empty cell while a name of two words takes its place.
 
+    Lines whose cells all stand below the words for their columns are aligned, and an empty cell would be seen.
+
     Raises:
-        BadInputError: one blank separates a name from digits alone, and several are at another place.
+        BadInputError: several blanks are at one place of a line, and elsewhere one blank separates a name from a cell
+            that may belong to it, because it has no sign.
     """
-    place = max((columns.index(label) for label in _LABELS if label in columns), default=0)
-    hidden = re.compile(rf"[ \t]*(\S+[ \t]+){{{place}}}\S+[ \t]\S.*([ \t]{{2}}|[ \t]$)")
+    above = [] if head is None else [word.span() for word in _AFTER_MARK.finditer(head.text)]
+    labels = [i for i, column in enumerate(columns) if column in _LABELS]
+    beside = sorted({gap for i in labels for gap in (i - 1, i)}, reverse=True)  # gaps, by the cell before each
     for row in body:
-        if row.cells[place + 1 :] and row.cells[place + 1].isdecimal() and hidden.match(row.text):
-            raise _may_be_one(row.cells[place], row.cells[place + 1], " ", row)
+        words = [word.span() for word in re.finditer(r"\S+", row.text)]
+        if not _WIDE.search(row.text) or _is_aligned(words, above):
+            continue
+        for i in beside:
+            pair = row.cells[max(i, 0) : i + 2]
+            if len(pair) < 2 or words[i + 1][0] - words[i][1] > 1:
+                continue
+            quoted = any(cell != row.text[slice(*word)] for cell, word in zip(pair, words[i : i + 2], strict=True))
+            if not quoted and not any(cell.startswith(("+", "-")) for cell in pair):
+                raise _may_be_one(pair[0], pair[1], " ", row)
+
+
+def _is_aligned(words: Sequence[tuple[int, int]], above: Sequence[tuple[int, int]]) -> bool:
+    """Whether each word stands below that of its column; all given by their places, begin and end."""
+    pairs = zip(words, above, strict=False)
+    return len(words) == len(above) and all(start < right and left < end for (start, end), (left, right) in pairs)
 
 
 def _may_be_one(name: str, more: str, separator: str, row: Row) -> BadInputError:

@@ -76,12 +76,12 @@ def test_a_table_is_read_as_it_stands(text: str | bytes, tmp_path: Path) -> None
         ("Left 1 10.5 20.5 3.5\nRight 2 11.5 21.5 4.5\n", "line 1: 'Left 1' may be one name"),
         ("L,1,10.5,20.5,3.5\nR,2,11.5,21.5,4.5\n", "line 1: 'L,1' may be one name"),
         ("name X Y Z s\nBall 1 10.5 20.5 0.01\n", "line 2: 'Ball 1' may be one name"),
-        ("L1,1.5,10.5,20.5,3.5,0.01\n", "line 1: sigmas sx, sy: give one for all"),
+        ("L1,1.5,10.5,20.5,0.02,0.01\n", "line 1: sigmas sx, sy: give one for all"),
         ("name X Y Z s\nB1 10.5 20.5 0.01\n", "line 2: 4 cells instead of 5"),
         ("name;X;Y;Z;sX;sZ\nB1;1;2;3;0.1;0.2\n", "line 2: sigmas sx, sz: give one for all"),
         ("name;X;Y;Z;s;sZ\nB1;1;2;3;0.1;0.2\n", "line 2: sigmas s, sz: give one for all"),
         ("name;X;Y;Z;sX;sY;sZ\nB1;1;2;3;0.1;;0.2\n", "line 2: a sigma is empty beside others"),
-        ("B1;1;2;3;0.1;\n", "line 1: a sigma is empty beside others"),
+        ("B1;1.5;2;3;0.1;\n", "line 1: a sigma is empty beside others"),
         ("name;X;Y;Z;s\nB1;1;2;3;-0.1\n", "line 2: a sigma of -0.1 is none"),
         ("name;X;X;Y;Z;s\nB1;1;1;2;3;0.1\n", "columns 'X' and 'X' are the same, x"),
         ("Id;Name;X;Y;Z;s\n7;B1;1;2;3;0.1\n", "columns 'Id' and 'Name' are the same, name"),
@@ -124,6 +124,26 @@ def test_what_could_be_read_otherwise_is_refused(text: str | bytes, pattern: str
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "ending"),
+    [
+        ("image;name;x;y;s\n1;K1;0.41;-0.02;0.012\n!16;K1;-0.87;0.5;\n", ".phc"),
+        ("name image x y\nB#15 #2 -11.9 13.1\n#7 B#28 4.2 12.1\n", ".phc"),
+        ("1;K1\n#2;K1\n", ".eor"),
+    ],
+)
+def test_lines_that_are_left_out_as_comments_are_said(text: str, ending: str, tmp_path: Path) -> None:
+    part = read_aicon(_file(tmp_path, text, f"a{ending}"), 0.01)
+    assert f"a{ending}: 1 lines of numbers are comments (# or !) and left out" in part.notes
+
+
+def test_a_blank_that_holds_words_together_is_no_end_of_a_word(tmp_path: Path) -> None:
+    """Spreadsheets and web pages write it; in Windows-1252 it is the only letter beyond ASCII of a whole file."""
+    path = _file(tmp_path, "name;X;Y;Z;s\nB\xa01;1.5;2;3;0.1\n".encode("cp1252"))
+    with pytest.raises(BadInputError, match=r"line 2: 'B\\xa01' is no name"):
+        import_network([path])
+
+
 def test_assumed_encodings_and_hidden_lines_are_said(tmp_path: Path) -> None:
     path = _file(tmp_path, "Hoppkant-Ø;1;2;3;0,1\n#7;1;2;3;0,1\n# Tuesday\n".encode("latin-1"))
     imported = import_network([path])
@@ -157,6 +177,16 @@ def test_lines_with_other_numbers_of_cells_are_refused_where_columns_have_no_nam
         ("K1 7 10.5 20.5 3.5\nK1 8 11.5 21.5 4.5\n", "line 1: 'K1 7' may be one name"),
         ("name X Y Z s\nK1 7 10.5 20.5  0.01\n", "line 2: 'K1 7' may be one name"),
         ("K1 7 10.5 20 3\nK2 8 11 21.5 4\n", "line 1: 'K1 7' may be one name"),
+        ("B1,417, 23.3, 66.846, ,,\n", "line 1: 'B1,417' may be one name"),
+        ("B1,317,24.5,56,,\nB2,318,25,57.5,,\n", "line 1: 'B1,317' may be one name"),
+        ("B2,31.5,-4.25,6.5,,,\nB1,317,24.3,56.846,,,\n", "line 2: 'B1,317' may be one name"),
+        (
+            "K,20.5,577.136,-132.196,350.3,0.005,0.001\n",
+            "line 1: sigmas of 0.001 and 350.3, of which one may be a coord",
+        ),
+        ("B1,8;115.02;81.264;378.4\na;22;19.264;118.52;423\n", "line 2: 5 cells, and 4 in the first line"),
+        ("name   X      Y      Z sX\nP 22.5 12.002  3.5     1\n", "line 2: 'P 22.5' may be one name"),
+        ("X Y Z name\n12.5 3.5  7 a\n", "line 2: '7 a' may be one name"),
     ],
 )
 def test_object_points_whose_cells_may_be_others_are_refused(text: str, pattern: str, tmp_path: Path) -> None:
@@ -172,6 +202,8 @@ def test_object_points_whose_cells_may_be_others_are_refused(text: str, pattern:
         ("image name x y s\n2 K1 7 4.25 3.5 \n", "line 2: 'K1 7' may be one name"),
         ("2 B1 7 4.25 3.5 0.002\n", "line 1: 'B1 7' may be one name"),
         ("cam1 1 17 4.25 3.5 0.002\ncam1 1 18 4.5 3.5 0.002\n", "line 1: '1 17' may be one name"),
+        ("P 30.5 -3 9.7 5.33 0.002\n", "line 1: sigmas of 0.002 and 5.33, of which one may be a coordinate"),
+        ("image name x y s\nv1.5  7 12 -3.21 2.56\n", "line 2: '7 12' may be one name"),
     ],
 )
 def test_image_points_whose_cells_may_be_others_are_refused(text: str, pattern: str, tmp_path: Path) -> None:
@@ -184,6 +216,7 @@ def test_image_points_whose_cells_may_be_others_are_refused(text: str, pattern: 
     [
         "B1   10.5   20.25   3.5   0.01   0.01   0.02\n  B2 11.5 21.25 4.5 0.01 0.01 0.02\n",
         "# point X Y Z sX sY sZ\nB1   10.5   20.25   3.5   0.01   0.01   0.02\nB2 11.5 21.25 4.5 0.01 0.01 0.02\n",
+        "nr    X     Y   Z   sX   sY   sZ\nB1 10.5 20.25 3.5 0.01 0.01 0.02\nB2 11.5 21.25 4.5 0.01 0.01 0.02\n",
     ],
 )
 def test_object_points_in_wide_columns_are_read_where_none_is_empty(text: str, tmp_path: Path) -> None:
@@ -199,6 +232,9 @@ def test_object_points_in_wide_columns_are_read_where_none_is_empty(text: str, t
         ("1;5;46.851;-0.467;-0.026\n", "'1;5' may be one name"),
         ("1 12.7 9.36 -0.365 0.193\n", "'1 12.7' may be one name"),
         ("B317 58.55  0.4\n", "line 1: several blanks at one place, which may be an empty cell"),
+        ("camera c x0 y0\nP 32.5    29    0.29\n", "line 2: 'P 32.5' may be one name"),
+        ("! camera c x0 y0\nP 32,5    29    2,90e-01\n", "line 2: 'P 32,5' may be one name"),
+        ("0.399,,a\t12\n", "line 1: '0.399,,a' may be several cells; write one separator"),
         ("camera c x0 y0\nB1  0.199 0.07\n", "line 2: several blanks at one place, which may be an empty cell"),
         ("B7;0;0;0\n", "line 1: c = 0 mm is no principal distance"),
     ],
@@ -213,6 +249,8 @@ def test_cameras_whose_cells_may_be_others_are_refused(text: str, pattern: str, 
     [
         ("# image camera x0 y0 z0\nB317 K1 2 0.360  110.377\n", "'K1 2' may be one name"),
         ("1;B17;5;60.263;3.855;\n", "line 1: 6 cells instead of 5"),
+        ("sep=\t\nimage;camera;X0;Y0;Z0\n10;B5;-68;37;-57\n", "line 2: 'image;camera;X0;Y0;Z0' may be several cells"),
+        ("  9.6 v1.5 32 -144.504 86.718    \n", "line 1: 'v1.5 32' may be one name"),
     ],
 )
 def test_poses_whose_cells_may_be_others_are_refused(text: str, pattern: str, tmp_path: Path) -> None:
@@ -250,7 +288,7 @@ def test_a_name_twice_in_a_file_is_refused(name: str, text: str, tmp_path: Path)
     ("text", "pattern"),
     [
         ("1 7 1.0 2.0\n", "line 1: has x0, y0 alone; write x0, y0, z0, or none of them"),
-        ("B1,K;1,2.5,3.5,4.5\n", "line 1: '1,2.5,3.5,4.5' may be several cells; write one separator in all lines"),
+        ("B1,K;1,2.5,3.5,4.5\n", "line 1: 'B1,K' may be several cells; write one separator in all lines"),
         (
             "image camera omega_deg phi_deg\n1 7 10 20\n",
             "line 2: has omega_deg, phi_deg alone; write omega_deg, phi_deg",

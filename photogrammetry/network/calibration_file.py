@@ -7,6 +7,7 @@ from pydantic import BaseModel, Field
 
 from photogrammetry.network.entries import Finite, Pixels, Positive
 from photogrammetry.network.formats import RESULT, require_format
+from photogrammetry.network.model import ImageFrame
 from photogrammetry.network.strict_text import read_json
 from rig.errors import BadInputError
 from rig.settings.strict_toml import validate
@@ -42,16 +43,21 @@ class _Result(BaseModel):
 
     format: Literal["svev-adjustment/1"]
     converged: bool
+    image_frame: ImageFrame | None = None
     cameras: dict[str, Any] = {}
     global_test: _GlobalTest = _GlobalTest()
 
 
-def read_calibration(path: Path) -> dict[str, CalibratedCamera]:
+def read_calibration(path: Path, frame: ImageFrame | None = None) -> dict[str, CalibratedCamera]:
     """Read the cameras of a result file (`svev-adjustment/1`).
 
+    Args:
+        path: of the file.
+        frame: in which the cameras are wanted; None: in that of the file, whatever it is.
+
     Raises:
-        BadInputError: missing, unreadable, no result file, or one of a calibration that did not converge or whose
-            observations contradict each other.
+        BadInputError: missing, unreadable, no result file, one of a calibration that did not converge or whose
+            observations contradict each other, or one with image coordinates of another frame.
     """
     data = read_json(path)
     require_format(data, RESULT, path)
@@ -60,6 +66,11 @@ def read_calibration(path: Path) -> dict[str, CalibratedCamera]:
         raise BadInputError(f"{path}: this calibration has no result; calibrate again or name another file")
     if not result.global_test.usable:
         raise BadInputError(f"{path}: sigma0 of this result is {result.global_test.words}")
+    if frame is not None and result.image_frame not in (None, frame):
+        raise BadInputError(
+            f'{path}: "image_frame" is "{result.image_frame}", and cameras of "{frame}" are wanted, whose c, x0, y0 '
+            "have another unit; calibrate with image coordinates of that frame"
+        )
     return {name: _camera(body, f"{path}: cameras.{name}") for name, body in result.cameras.items()}
 
 

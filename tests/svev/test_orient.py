@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from photogrammetry.network.file_writer import network_to_json, write_network
-from photogrammetry.network.model import Network, Role
+from photogrammetry.network.model import ImageFrame, Network, Role
 from svev.cli import main
 from tests.photogrammetry.synthetic import hill
 from tests.support.repeats import repeats
@@ -96,6 +96,15 @@ def test_calibration_replaces_the_cameras(run: Run, tmp_path: Path) -> None:
     assert code == 0
     assert result["images"]["hill-2"]["X0"] == pytest.approx(sound["images"]["hill-2"]["X0"], abs=1e-6)
     assert result["cameras"]["K1"]["sigma"] == {}
+
+
+def test_a_calibration_in_another_unit_is_refused(run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Cameras in millimetres would end as a network that does not converge for want of start values."""
+    network = hill(1, helmets=17).network
+    other = "metric" if network.image_frame is ImageFrame.PIXEL else "pixel"
+    code, _ = run(network, "--calibration", str(_calibration(tmp_path / "cameras.json", image_frame=other)))
+    assert code == 2
+    assert f'"image_frame" is "{other}", and cameras of "{network.image_frame}" are wanted' in capsys.readouterr().err
 
 
 def test_a_camera_that_the_calibration_lacks_is_left_out(

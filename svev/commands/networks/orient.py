@@ -80,7 +80,7 @@ def orient(
     given = read_network(network)
     left_out: list[str] = []
     if calibration is not None:
-        given, left_out = with_calibration(given, read_calibration(calibration))
+        given, left_out = with_calibration(given, read_calibration(calibration, given.image_frame))
     given = with_weights(given, reweight=reweight, paper=paper)
     came_from = origin(context, network=network, calibration=calibration)
     named_points(given, covariance or (), "--covariance")  # before anything is computed

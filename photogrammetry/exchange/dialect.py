@@ -65,11 +65,14 @@ def read_rows(path: Path) -> Rows:
     """
     text, notes = _text(path)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    named = re.fullmatch(r'"?sep=(.)"?', lines[0])
+    first = next((i for i, line in enumerate(lines) if line.strip() and not _is_comment(line)), 0)
+    named = re.fullmatch(r'"?sep=(.)"?', lines[first])
     if named is not None:
-        lines[0] = ""
+        lines[first] = ""
         if named[1] not in _SEPARATORS:
-            raise BadInputError(f"{path}: line 1: {named[0]}: the separator must be one of ; , tab; save it so")
+            raise BadInputError(
+                f"{path}: line {first + 1}: {named[0]}: the separator must be one of ; , tab; save it so"
+            )
     separator = named[1] if named is not None else _separator([line for line in lines if not _is_comment(line)])
     rows = []
     for number, line in enumerate(lines, start=1):

@@ -54,7 +54,7 @@ _UNLIKE: Final = 10.0
 _WITH_UNIT: Final = re.compile(r"(\w+) *[\[(].*[\])]")
 #: No principal point is so far from the middle of a picture: mm, and as a share of c.
 _FAR_MM: Final = 1.0
-_FAR_SHARE: Final = 0.25
+_FAR_SHARE: Final = 0.1
 #: Axes of a surveyor, by what they are: X is east, Y north, Z height, which is right-handed.
 _SURVEYORS: Final = {
     **dict.fromkeys(("e", "east", "easting", "øst"), "x"),

@@ -52,6 +52,7 @@ def read_csv(path: Path) -> list[tuple[Key, Entered]]:
     if not rows:
         raise BadInputError(f"{path}: holds no rows; name a table of marks")
     places = _headings(rows[0])
+    _check_counts(rows, table.separator)
     words = [
         row.cells[places[name]]
         for row in rows[1:]
@@ -85,6 +86,22 @@ def _headings(row: Row) -> dict[str, int]:
             f"{', '.join(_UNITS.get(name, name) for name in _COLUMNS)}"
         )
     return found
+
+
+def _check_counts(rows: Sequence[Row], separator: str) -> None:
+    """Refuse rows with more cells than headings; between commas also empty ones, between blanks also fewer.
+
+    Raises:
+        BadInputError: a decimal comma or a word may be taken for two cells, or blanks may hide an empty one.
+    """
+    count = len(rows[0].cells)
+    for row in rows[1:]:
+        more = row.cells[count:] if separator == "," else any(row.cells[count:])
+        if more or (separator == " " and len(row.cells) < count):
+            raise BadInputError(
+                f"{row.place}: {len(row.cells)} cells below {count} headings; write decimals with a point, quotes "
+                "around words with the separator, and semicolons between cells of which some are empty"
+            )
 
 
 def _mark(row: Row, places: Mapping[str, int], numbers: Mapping[str, str]) -> tuple[Key, Entered]:

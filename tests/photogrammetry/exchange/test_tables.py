@@ -38,6 +38,7 @@ SEMICOLONS: Final = "Name;X;Y;Z;sX;sY;sZ\r\nB1;10,5;20,25;3,5;0,01;0,01;0,02\r\n
         SEMICOLONS,
         SEMICOLONS.replace("\r\n", "\r"),
         "sep=;\r\n" + SEMICOLONS,
+        "# surveyed in May\r\nsep=;\r\n" + SEMICOLONS,
         SEMICOLONS.replace("B1", '"B1"').replace(";X;", ';"X";').replace("20,25", '"20,25"'),
         SEMICOLONS.replace("\r\n", ";;\r\n") + ";;;;;;;;\r\n",
         SEMICOLONS.replace(";", "\t"),
@@ -236,6 +237,7 @@ def test_object_points_in_wide_columns_are_read_where_none_is_empty(text: str, t
         ("! camera c x0 y0\nP 32,5    29    2,90e-01\n", "line 2: 'P 32,5' may be one name"),
         ("0.399,,a\t12\n", "line 1: '0.399,,a' may be several cells; write one separator"),
         ("camera c x0 y0\nB1  0.199 0.07\n", "line 2: several blanks at one place, which may be an empty cell"),
+        ("K,31.5,5.483,0.1,-0.4\n", "'K,31.5' may be one name"),
         ("B7;0;0;0\n", "line 1: c = 0 mm is no principal distance"),
     ],
 )

@@ -69,6 +69,22 @@ def test_spreadsheets_are_read_right(text: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "pulse,camera,thing,x,y\n5,K1,P1,10,5,20,25\n",
+        "pulse,camera,thing,x,y\n5,K1,P1,10,5,20,\n",
+        "pulse;camera;thing;x;y\n5;K1;P1;a;10;20\n",
+        "pulse camera thing x y sigma_x sigma_y\n5 K1 P1 10.5 20.5  0.3\n",
+    ],
+)
+def test_rows_with_other_numbers_of_cells_than_headings_are_refused(text: str, tmp_path: Path) -> None:
+    """A decimal comma between commas would move all that follows: 10,5 and 20,25 were the place 10, 5."""
+    (tmp_path / "marks.csv").write_text(text)
+    with pytest.raises(BadInputError, match=r"line 2: \d cells below \d headings; write decimals with a point"):
+        read_csv(tmp_path / "marks.csv")
+
+
+@pytest.mark.parametrize(
     ("row", "said"),
     [
         ("7;K1;P1;;measured;1,5;2.25;;;", "is a decimal comma or none"),

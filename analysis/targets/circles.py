@@ -127,7 +127,7 @@ def _fitted_discs(grey: NDArray[np.float32], start: Floats, slope: Floats, radiu
         (start - middle, inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1], (high - low) / 2, (high + low) / 2,
          np.zeros((len(start), 2)), np.full(len(start), np.log(FIRST_BLUR)))
     )  # fmt: skip
-    fit = fitted(unknowns, lambda tried: _linearised(tried, values, dx, dy, inside))
+    fit = fitted(unknowns, lambda tried, these: _linearised(tried, values[these], dx, dy, inside[these]))
     moved = np.linalg.norm(np.einsum("nij,nj->ni", inverse, fit.unknowns[:, :2] - (start - middle)), axis=1)
     return Measured(
         middle + fit.unknowns[:, :2],
@@ -141,7 +141,7 @@ def _fitted_discs(grey: NDArray[np.float32], start: Floats, slope: Floats, radiu
 
 
 def _linearised(unknowns: Floats, values: Floats, dx: Floats, dy: Floats, inside: Flags) -> tuple[Floats, Floats]:
-    """Residuals (n, p) of the grey values, computed - observed, and derivatives (n, p, 10), zero outside windows.
+    """Residuals (n, p) of the grey values, computed - observed, and derivatives (n, 10, p), zero outside windows.
 
     The derivatives are those on the edge, where alone they are not small.
     """
@@ -168,6 +168,7 @@ def _linearised(unknowns: Floats, values: Floats, dx: Floats, dy: Floats, inside
             light * edge, light, shade * dx, shade * dy,
             -by_far * far,
         ),
-        axis=-1,
+        axis=1,
     )  # fmt: skip
-    return np.where(inside, light * shade - values, 0.0), slopes * inside[..., None]
+    slopes *= inside[:, None]
+    return np.where(inside, light * shade - values, 0.0), slopes

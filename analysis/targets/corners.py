@@ -49,7 +49,7 @@ def measure_corners(grey: NDArray[np.float32], start: Floats, edges: Floats, rad
         (start - middle, angle, (high - low) / 2, (high + low) / 2, np.zeros((len(start), 2)),
          np.full(len(start), np.log(FIRST_BLUR)))
     )  # fmt: skip
-    fit = fitted(unknowns, lambda tried: _linearised(tried, values, dx, dy))
+    fit = fitted(unknowns, lambda tried, these: _linearised(tried, values[these], dx, dy))
     moved = np.linalg.norm(fit.unknowns[:, :2] - (start - middle), axis=1)
     return Measured(
         middle + fit.unknowns[:, :2],
@@ -70,7 +70,7 @@ def _inwards(angle: Floats, edges: Floats) -> Floats:
 
 
 def _linearised(unknowns: Floats, values: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
-    """Residuals (n, p) of the grey values, computed - observed, and derivatives (n, p, 9)."""
+    """Residuals (n, p) of the grey values, computed - observed, and derivatives (n, 9, p)."""
     x, y = dx - unknowns[:, 0, None], dy - unknowns[:, 1, None]
     blur = np.exp(unknowns[:, 8, None])
     a = unknowns[:, 4, None]
@@ -92,6 +92,6 @@ def _linearised(unknowns: Floats, values: Floats, dx: Floats, dy: Floats) -> tup
             light * pattern, light, shade * dx, shade * dy,
             -(by_first * f1 + by_second * f2),
         ),
-        axis=-1,
+        axis=1,
     )  # fmt: skip
     return light * shade - values, slopes

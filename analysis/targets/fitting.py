@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from rig.arrays import Flags, Floats
+from rig.arrays import Flags, Floats, Integers
 
 FIRST_BLUR: Final = 1.0  # px, to start from
 _BLUR: Final = (0.3, 4.0)  # px, in which a window shows edges at all
@@ -55,34 +55,44 @@ class Fit:
     settled: Flags
 
 
-def fitted(start: Floats, linearised: Callable[[Floats], tuple[Floats, Floats]]) -> Fit:
-    """Fit by damped steps (Levenberg and Marquardt).
+def fitted(start: Floats, linearised: Callable[[Floats, Integers], tuple[Floats, Floats]]) -> Fit:
+    """Fit by damped steps (Levenberg and Marquardt), each window until it has come to rest.
 
     Args:
         start: (n, u) start values of the unknowns: first x and y (px), last the logarithm of the blur's width (px).
-        linearised: residuals (n, p), computed - observed, and derivatives (n, p, u) for unknowns (n, u).
+        linearised: residuals (m, p), computed - observed, and derivatives (m, u, p) for unknowns (m, u) of the windows
+            with these m indices.
     """
     unknowns = start.copy()
     count, size = unknowns.shape
+    moving = np.arange(count)
+    residual, slopes = linearised(unknowns, moving)
+    cost = np.sum(residual**2, axis=1)
+    normal = slopes @ slopes.swapaxes(1, 2)
+    gradient = _times(slopes, residual)
     damping = np.full(count, 1e-3)
-    residual, slopes = linearised(unknowns)
-    cost = np.einsum("np,np->n", residual, residual)
-    step = np.zeros_like(unknowns)
+    moved = np.zeros(count)
     for _ in range(_STEPS):
-        normal = np.einsum("npi,npj->nij", slopes, slopes)
-        diagonal = np.einsum("nii->ni", normal)
-        damped = normal + (damping[:, None] * diagonal + 1e-9)[..., None] * np.eye(size)
-        step = -np.linalg.solve(damped, np.einsum("npi,np->ni", slopes, residual)[..., None])[..., 0]
-        tried = unknowns + step
+        diagonal = np.einsum("nii->ni", normal[moving])
+        damped = normal[moving] + (damping[moving, None] * diagonal + 1e-9)[..., None] * np.eye(size)
+        step = -np.linalg.solve(damped, gradient[moving, :, None])[..., 0]
+        moved[moving] = np.abs(step[:, :2]).max(axis=1)
+        tried = unknowns[moving] + step
         tried[:, -1] = np.clip(tried[:, -1], *np.log(_BLUR))
-        next_residual, next_slopes = linearised(tried)
-        next_cost = np.einsum("np,np->n", next_residual, next_residual)
-        better = next_cost <= cost
-        unknowns[better], residual[better], slopes[better] = tried[better], next_residual[better], next_slopes[better]
-        cost = np.where(better, next_cost, cost)
-        damping = np.where(better, damping / 5.0, np.minimum(damping * 5.0, 1e6))
-        if np.all(np.abs(step[:, :2]).max(axis=1) < _ENOUGH):
+        residual, slopes = linearised(tried, moving)
+        tried_cost = np.sum(residual**2, axis=1)
+        better = tried_cost <= cost[moving]
+        damping[moving] = np.where(better, damping[moving] / 5.0, np.minimum(damping[moving] * 5.0, 1e6))
+        found, slopes = moving[better], slopes[better]
+        unknowns[found], cost[found] = tried[better], tried_cost[better]
+        normal[found], gradient[found] = slopes @ slopes.swapaxes(1, 2), _times(slopes, residual[better])
+        moving = moving[~better | (moved[moving] >= _ENOUGH)]
+        if not len(moving):
             break
-    cofactor = np.linalg.pinv(np.einsum("npi,npj->nij", slopes, slopes), hermitian=True)
-    settled = np.abs(step[:, :2]).max(axis=1, initial=0.0) < 10.0 * _ENOUGH
-    return Fit(unknowns, cost, np.stack((cofactor[:, 0, 0], cofactor[:, 1, 1]), axis=1), settled)
+    cofactor = np.linalg.pinv(normal, hermitian=True)
+    return Fit(unknowns, cost, np.stack((cofactor[:, 0, 0], cofactor[:, 1, 1]), axis=1), moved < 10.0 * _ENOUGH)
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    """(n, u) from (n, u, p) and (n, p)."""
+    return np.asarray((matrices @ vectors[..., None])[..., 0])

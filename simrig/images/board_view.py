@@ -21,7 +21,8 @@ _WALL: Final = 110.0
 _FINE: Final = 4  # rays along a pixel's side, while the board is still
 _OUTLINE: Final = np.array([(-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0)], dtype=float)
 _SPARE_PX: Final = 8  # around the corners of a sheet: its sides are bent by the lens
-_STEPS: Final = 20  # of finding the ideal place that a lens shows at a given one
+_STEPS: Final = 20  # of finding the ideal place that a lens shows at a given one, at most
+_ENOUGH_PX: Final = 1e-4  # of a step: below what single precision tells apart at the edge of the largest pictures
 
 
 class BoardView:
@@ -50,7 +51,8 @@ class BoardView:
         self._before = before.projection(width, height)
         self._projection = self._settings.projection(width, height)
         self._sheets = [(sheet, _raster(sheet)) for sheet in load_sheets(board.pattern)]
-        self._coarse, self._fine = _ideal(self._projection, 1), _ideal(self._projection, _FINE)
+        ideal = _ideal(self._projection)
+        self._coarse, self._fine = _rays(ideal, 1), _rays(ideal, _FINE)
         self._blur = scenario.image.blur_sigma_px * _FINE
         self._gain, self._black_level = np.float32(self._settings.gain), np.float32(scenario.image.black_level)
         self._sensor = Sensor(scenario.image, scenario.seed, camera, (height, width), bits)
@@ -138,18 +140,26 @@ def _averaged(places: Image, fine: int) -> Image:
     return np.asarray(begin + np.clip((places - begin - 0.5) / covered + 0.5, 0.0, 1.0), np.float32)
 
 
-def _ideal(camera: Projection, fine: int) -> tuple[Image, Image]:
-    """Ideal metric coordinates x, y, (rows, columns) each, of a grid with `fine` rays along a pixel's side."""
+def _ideal(camera: Projection) -> Floats:
+    """Ideal metric coordinates x, y, (2, rows + 2, columns + 2), of the pixels and of one more on each side."""
     across, down = np.meshgrid(np.arange(-1, camera.width + 1), np.arange(-1, camera.height + 1))
     wanted = np.stack((across - (camera.width - 1) / 2, (camera.height - 1) / 2 - down), axis=-1)
     ideal: Floats = wanted.copy()
     if camera.lens is not None:
         reach = float(np.hypot(camera.width, camera.height))
         for _ in range(_STEPS):
-            ideal += wanted - camera.lens.bend(ideal, reach)
-    size = (camera.width + 2) * fine, (camera.height + 2) * fine
+            off = wanted - camera.lens.bend(ideal, reach)
+            ideal += off
+            if np.abs(off).max() < _ENOUGH_PX:
+                break
+    return np.moveaxis(ideal, -1, 0)
+
+
+def _rays(ideal: Floats, fine: int) -> tuple[Image, Image]:
+    """Ideal metric coordinates x, y, (rows, columns) each, of a grid with `fine` rays along a pixel's side."""
+    size = ideal.shape[2] * fine, ideal.shape[1] * fine
     x, y = (
         np.ascontiguousarray(cv2.resize(each, size, interpolation=cv2.INTER_LINEAR)[fine:-fine, fine:-fine], np.float32)
-        for each in (ideal[..., 0], ideal[..., 1])
+        for each in ideal
     )
     return x, y

@@ -4,7 +4,7 @@ Rays of a grid finer than the pixels meet planes with targets; then come blur, t
 """
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Final
 
 import cv2
@@ -19,7 +19,7 @@ _FINE: Final = 4  # rays along a pixel's side
 _FINER: Final = 4  # raster cells of targets with circles for one of the others
 #: What a corner reaches that is computed: nothing is bent within it.
 EXACT: Final = ((1e-3, 0.0), (0.0, 1e-3))
-_STRIP: Final = 16  # rows of the fine grid that are computed at a time: their arrays stay in the processor's cache
+_STRIP: Final = 32_000  # rays that are computed at a time, in whole rows: their arrays stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -106,9 +106,17 @@ def single_raster(code: int) -> NDArray[np.float32]:
 def circles_raster(code: int) -> NDArray[np.float32]:
     """A target with discs of an eighth of the square's side about its corners; four cells where the others have one."""
     raster = np.kron(single_raster(code), np.ones((_FINER, _FINER), np.float32))
-    inside, size = slice(12 * _FINER, 28 * _FINER), 40 * _FINER
-    shades = np.full((size, size), _BRIGHT, np.float32)
+    inside = slice(12 * _FINER, 28 * _FINER)
+    shades = _discs().copy()
     shades[inside, inside] = raster[inside, inside]
+    return shades
+
+
+@cache
+def _discs() -> NDArray[np.float32]:
+    """The discs of all targets with circles, on white."""
+    size = 40 * _FINER
+    shades = np.full((size, size), _BRIGHT, np.float32)
     parts = 8  # along a cell's side, of which each is within the disc or outside
     fine = (np.arange(size * parts) + 0.5) / (_FINER * parts)
     for row in (8.0, 32.0):
@@ -180,9 +188,10 @@ def _draw(
     into = [(rotation.T @ axis).tolist() for axis in (right, above, towards)]
     start = position - sheet.place
     c, u0, v0, depth = float(camera.c), float(right @ start), float(above @ start), float(-towards @ start)
-    end = int(row[-1]) + 1
-    for top in range(int(row[0]), end, _STRIP):
-        bottom = min(top + _STRIP, end)
+    end, height = int(row[-1]) + 1, max(_STRIP // len(column), 1)
+    padded = np.pad(sheet.raster, 1, mode="edge")
+    for top in range(int(row[0]), end, height):
+        bottom = min(top + height, end)
         first, last = max(top - 1, int(row[0])), min(bottom + 1, end)  # the slope of a row needs its neighbours
         wide = np.s_[first:last, column[0] : column[-1] + 1]
         x, y = camera.rays[0][wide], camera.rays[1][wide]
@@ -194,16 +203,15 @@ def _draw(
             (down >= 0) & (down < rows) & (across >= 0) & (across < columns) & (scale > 0) & (scale < nearest[wide])
         )
         within[: top - first] = within[bottom - first :] = False
-        fine[wide][within] = _mean_shade(sheet.raster, across, down, within)
+        fine[wide][within] = _mean_shade(padded, across, down, within)
         nearest[wide][within] = scale[within]
 
 
-def _mean_shade(raster: NDArray[np.float32], across: Array, down: Array, wanted: NDArray[np.bool_]) -> Array:
+def _mean_shade(padded: NDArray[np.float32], across: Array, down: Array, wanted: NDArray[np.bool_]) -> Array:
     """The mean of the raster over the footprint of each ray that is wanted, in their order; places in cells.
 
-    A footprint is smaller than a cell.
+    A footprint is smaller than a cell. The raster is padded by a cell on each side.
     """
-    padded = np.pad(raster, 1, mode="edge")
     columns = padded.shape[1]
     shares, cells = [], np.full(np.count_nonzero(wanted), columns + 1, np.intp)
     for places, step in ((down, columns), (across, 1)):

@@ -1,4 +1,4 @@
-"""Lets only the camera's own packets into the sockets of Aravis, by filters in the kernel.
+"""Lets only the camera's own packets into the sockets of Aravis, by filters in the kernel, and makes room for them.
 
 Aravis asks for the sender's address only on a packet socket, and never for its port. Whatever arrives at the port of a
 stream is a packet of the camera to it, and can take the place of picture; whatever arrives at the port of the control
@@ -14,6 +14,8 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
+
+from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES
 
 _SO_ATTACH_FILTER, _SO_MEMINFO = 26, 55  # <asm-generic/socket.h>
 _MEMINFO = struct.Struct("9I")  # <linux/sock_diag.h>
@@ -54,7 +56,7 @@ def filter_control(before: Collection[str], camera: str) -> None:
     Raises:
         OSError: the kernel refuses the filter.
     """
-    for found in _opened_since(before):
+    for found in opened_since(before):
         with found:
             if found.family == socket.AF_INET and found.type == socket.SOCK_DGRAM:
                 _attach_udp(found, _number(camera), _GVCP_PORT)
@@ -70,7 +72,10 @@ class SourceFilter:
     """
 
     def __init__(self, before: Collection[str], local: tuple[str, int], camera: tuple[str, int]) -> None:
-        """Find the stream's sockets and attach the filter.
+        """Find the stream's sockets, attach the filter, and enlarge the receive buffer of a plain socket.
+
+        Aravis asks for the large buffer only once a packet has come: until then the first frames would have to fit into
+        the kernel's default one.
 
         Args:
             before: the inodes of `open_sockets()` before the stream was made.
@@ -122,7 +127,7 @@ class SourceFilter:
         self._udp = self._packet = None
 
     def _find(self, before: Collection[str]) -> None:
-        for found in _opened_since(before):
+        for found in opened_since(before):
             if found.family == socket.AF_PACKET:
                 self._packet = found
             elif found.family == socket.AF_INET and found.getsockname() == self._local:
@@ -142,11 +147,12 @@ class SourceFilter:
             ])  # fmt: skip
         elif self._udp is not None:
             _attach_udp(self._udp, address, port if self.by_port else None)
+            self._udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BUFFER_BYTES)
         else:
             raise OSError("the socket of the stream is not found")
 
 
-def _opened_since(before: Collection[str]) -> Iterator[socket.socket]:
+def opened_since(before: Collection[str]) -> Iterator[socket.socket]:
     """The sockets that this process has opened, by descriptors of our own."""
     for inode, descriptor in open_sockets().items():
         if inode not in before:

@@ -49,31 +49,28 @@ def look_at_packet_sockets(rig: RigSettings) -> Iterator[Finding]:
 
 
 def look_at_socket_buffers(rig: RigSettings) -> Iterator[Finding]:
-    """Are the buffers of plain sockets large enough? Too small ones lose packets, above all of the first frame."""
+    """May the buffers of plain sockets be large enough? Too small ones lose packets."""
     plain = [
         camera for camera in gige_cameras(rig) if _prefers_plain_socket(rig, camera) or not _may_use_packet_sockets()
     ]
     if not plain:
         return
-    largest = max(camera.frame_bytes for camera in plain)
-    # Aravis asks for the large buffer only after the first packet, so the first frame has to fit into the default one.
-    # The kernel counts its own overhead in, about as much again.
-    wanted = {"rmem_max": min(SOCKET_BUFFER_BYTES, STALL_FRAMES * largest), "rmem_default": 2 * largest}
-    for name, least in wanted.items():
-        value = int(Path(f"/proc/sys/net/core/{name}").read_text())
-        if value >= least:
-            what = "net.core.{name} is {value}"
-            yield passed(Topic.NETWORK, "check_socket_buffer", what, name=name, value=str(value))
-        else:
-            yield warning(
-                Topic.NETWORK,
-                "check_socket_buffer_small",
-                "net.core.{name} is {value}, {least} is wanted: packets may be lost",
-                "run: sudo sysctl -w net.core.{name}={least} (for good: a line in /etc/sysctl.d/90-svev.conf)",
-                name=name,
-                value=str(value),
-                least=str(least),
-            )
+    least = min(SOCKET_BUFFER_BYTES, STALL_FRAMES * max(camera.frame_bytes for camera in plain))
+    name = "rmem_max"
+    value = int(Path(f"/proc/sys/net/core/{name}").read_text())
+    if value >= least:
+        what = "net.core.{name} is {value}"
+        yield passed(Topic.NETWORK, "check_socket_buffer", what, name=name, value=str(value))
+    else:
+        yield warning(
+            Topic.NETWORK,
+            "check_socket_buffer_small",
+            "net.core.{name} is {value}, {least} is wanted: packets may be lost",
+            "run: sudo sysctl -w net.core.{name}={least} (for good: a line in /etc/sysctl.d/90-svev.conf)",
+            name=name,
+            value=str(value),
+            least=str(least),
+        )
 
 
 def look_at_interfaces(rig: RigSettings) -> Iterator[Finding]:

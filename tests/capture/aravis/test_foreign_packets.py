@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from capture.aravis.camera import AravisCamera
-from capture.aravis.source_filter import open_sockets
+from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES
+from capture.aravis.source_filter import SourceFilter, open_sockets
 from rig.frame import FrameRecord
 from simrig.gige.protocol.gvsp import FrameFormat, PacketTable
 from tests.capture.aravis.camera import OneCamera, one_camera
@@ -151,6 +152,16 @@ def _check(pulses: list[int]) -> None:
     whole = [pulse for pulse in pulses if pulse >= 0]
     assert whole == sorted(set(whole))
     assert len(whole) >= 0.9 * (whole[-1] - whole[0] + 1)
+
+
+def test_frames_that_come_before_the_first_packet_is_taken_have_room(loopback: Loopback) -> None:
+    """The kernel counts twice what is asked for, and grants no more than its limit."""
+    before = open_sockets()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stream:
+        stream.bind((loopback.host, 0))
+        SourceFilter(before, stream.getsockname(), (loopback.host, 0)).close()
+        given = stream.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+    assert given == 2 * min(SOCKET_BUFFER_BYTES, int(Path("/proc/sys/net/core/rmem_max").read_text()))
 
 
 def test_nobody_else_answers_for_the_camera(tmp_path: Path, loopback: Loopback) -> None:

@@ -1,6 +1,7 @@
 """A camera opened with the real Aravis, and what it receives."""
 
 import gc
+import socket
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import gi
 import numpy as np
 from numpy.typing import NDArray
 
+from capture.aravis.source_filter import open_sockets, opened_since
 from rig.pulse import HillPulse
 from simrig.images import stamp
 
@@ -21,6 +23,7 @@ from gi.repository import Aravis  # noqa: E402
 Aravis.disable_interface("USB3Vision")
 
 _BUFFERS = 60
+_SOCKET_BUFFER_BYTES = 8 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,12 +82,16 @@ class Receiver:
                 self.device.set_integer_feature_value(name, value)
         if not packet_socket:
             self.camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
+        before = open_sockets()
         self.stream = self.camera.create_stream(None, None)
+        for opened in opened_since(before):
+            with opened:  # Aravis enlarges it only once a packet has come: a stall before that would lose frames
+                opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BUFFER_BYTES)
         for name, value in {
             "socket-buffer": Aravis.GvStreamSocketBuffer.FIXED,
-            "socket-buffer-size": 8 << 20,
+            "socket-buffer-size": _SOCKET_BUFFER_BYTES,
             "packet-timeout": 50_000,
-            "packet-request-ratio": 1.0,  # until the first packet has come the socket's buffer is small
+            "packet-request-ratio": 1.0,  # a stall may lose most of a frame's packets: ask for all of them
             "frame-retention": retention_us,
         }.items():
             self.stream.set_property(name, value)

@@ -6,11 +6,12 @@ import sys
 import time
 from itertools import pairwise
 from pathlib import Path
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 
 import pytest
 
 from tests.support import loopback as loopback_blocks
-from tests.support.leaks import used_elsewhere
+from tests.support.leaks import Snapshot, used_elsewhere
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
 
@@ -209,6 +210,13 @@ sys.stdin.read()
         assert path.exists()
         assert used_elsewhere(path)
         other.stdin.close()
+
+
+def test_a_folder_of_another_program_is_no_shared_memory() -> None:
+    with TemporaryDirectory(dir="/dev/shm") as folder, NamedTemporaryFile(dir="/dev/shm") as file:
+        found = Snapshot.take("none").shared_memory
+    assert Path(file.name) in found
+    assert Path(folder) not in found
 
 
 def test_two_runs_at_once_get_different_addresses(loopback: Loopback) -> None:

@@ -34,7 +34,7 @@ class Snapshot:
         threads = (t for t in threading.enumerate() if not isinstance(t, threading._DummyThread))
         return cls(
             own_processes(token), frozenset(threads), _native_threads(), open_descriptors(),
-            frozenset(_SHARED_MEMORY.iterdir()),
+            _shared_memory(),
         )  # fmt: skip
 
 
@@ -95,6 +95,12 @@ def _new_since(before: Snapshot, token: str, spare_events: int, *, all_kinds: bo
         if not used_elsewhere(path)
     ]
     return Leaks(processes, tuple(sorted(others)))
+
+
+def _shared_memory() -> frozenset[Path]:
+    """Its pieces are files: a folder there is a disk for somebody, such as another program on this computer."""
+    with os.scandir(_SHARED_MEMORY) as entries:
+        return frozenset(Path(entry.path) for entry in entries if not entry.is_dir(follow_symlinks=False))
 
 
 def _native_threads() -> frozenset[tuple[int, str]]:

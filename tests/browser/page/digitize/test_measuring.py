@@ -338,8 +338,7 @@ def test_a_ski_that_is_drawn_in_two_images_is_found_in_all(desk: Desk, open_page
         _draw(page, camera, _ends(desk, camera), hand)
         if camera == "K1":
             expect(_signs_of(page, "right ski", 0)).to_have_attribute("data-letter", re.compile("[mr]"))
-            line = desk.mark("K1", "right ski")
-            assert line is not None
+            line = _kept_line(desk, "K1")
             assert all(_beside(desk, "K1", vertex["xy"]) < 2.5 for vertex in line["vertices"])
             if line["vertices"][0]["source"] == "hand":  # no edge was sure: nothing better than a hand is said
                 assert {vertex["sigma"] for vertex in line["vertices"]} == {None}
@@ -348,6 +347,41 @@ def test_a_ski_that_is_drawn_in_two_images_is_found_in_all(desk: Desk, open_page
     ski = desk.log.truth[PULSE]["skis"]["right"]
     slope = desk.view()["lines"]["right ski"]["slope"]
     assert abs(slope["value"] - np.degrees(np.arcsin(ski["direction"][2]))) < 5 * slope["sigma"]
+
+
+def test_a_wheel_that_turns_as_a_picture_changes_its_size_zooms_about_the_pointer(desk: Desk, open_page: Open) -> None:
+    page = enter(open_page, desk, width=1366, height=1024)
+    page.locator("#loupe").select_option("0")
+    before = canvas_of(page, "K1")
+    page.evaluate("""() => {
+        const canvas = document.querySelector('.pane[data-camera="K1"] canvas');
+        canvas.style.width = "50%";
+        const { left, top, width, height } = canvas.getBoundingClientRect();
+        const middle = { clientX: left + width / 2, clientY: top + height / 2 };
+        canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -800, cancelable: true, ...middle }));
+    }""")
+    settled(page)
+    box = canvas_of(page, "K1")
+    assert box["width"] < 0.6 * before["width"]
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    desk.wait_for(1)
+    mark = desk.mark("K1", "P1")
+    assert mark is not None
+    assert mark["xy"] == pytest.approx((np.array(SIZE) - 1) / 2, abs=1.0)
+
+
+def _kept_line(desk: Desk, camera: str) -> dict[str, Any]:
+    """The right ski as it is kept, once all its points are: the page shows the first one before."""
+    lines: list[dict[str, Any]] = []
+
+    def whole() -> bool:
+        line = desk.mark(camera, "right ski")
+        if line is not None:
+            lines.append(line)
+        return line is not None and len(line["vertices"]) == (5, 2)[line["vertices"][0]["source"] == "refined"]
+
+    wait_until(whole, f"the line in {camera} is kept", 20)
+    return lines[-1]
 
 
 def _signs_of(page: Page, thing: str, image: int) -> Any:

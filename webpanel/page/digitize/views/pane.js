@@ -56,11 +56,16 @@ export function makePane({ name, size }, look) {
   /** Whether a finger is on a small picture, to make it the large one: it measures nothing. */
   let chosen = false;
 
-  new ResizeObserver(() => {
+  function measure() {
     const { width, height } = paintedBox(canvas);
-    box = [Math.max(1, width), Math.max(1, height)];
+    if (width !== box[0] || height !== box[1]) box = [Math.max(1, width), Math.max(1, height)];
+  }
+  new ResizeObserver(() => {
+    measure();
     redraw();
   }).observe(canvas);
+  // The observer tells of a new size only with the next frame: what the hand does before means the picture as it is by then.
+  for (const kind of ["pointerdown", "pointermove", "pointerup", "wheel"]) canvas.addEventListener(kind, measure, { capture: true, passive: true });
 
   const lens = () => state.lenses[name] ?? whole(size, box);
 

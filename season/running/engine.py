@@ -165,6 +165,7 @@ class _Run:
         self._last = last
         self._names: dict[Future[Any], str] = {}
         self._suspects: list[str] = []
+        self._threads, self._counted = 0, -_LOOK_S
 
     def all_of(self, names: Iterable[str]) -> list[str]:
         """Run these tasks.
@@ -174,12 +175,19 @@ class _Run:
         """
         left = deque(names)
         while left or self._names:
-            room = 1 if self._last else _PER_THREAD * self._on.threads
-            while left and len(self._names) < room:
+            while left and len(self._names) < self._room():
                 self._submit(left.popleft())
             for future in self._ended():
                 self._end(self._names.pop(future), future)
         return self._suspects
+
+    def _room(self) -> int:
+        """How many tasks may be under way; the scheduler is asked for its workers only now and then."""
+        if self._last:
+            return 1
+        if (now := time.monotonic()) >= self._counted + _LOOK_S:
+            self._threads, self._counted = self._on.threads, now
+        return _PER_THREAD * self._threads
 
     def _submit(self, name: str) -> None:
         # pure=False: a name of its own, else Dask would take the result of an equal task for that of this one.

@@ -6,7 +6,6 @@ The commands are `rig.transport.recorder_commands.RecorderCommand`, the reports 
 import os
 import select
 from collections import deque
-from collections.abc import Callable
 from typing import Final
 
 from recorder.live.assembler import Assembler, Triplet, in_flight_triplets
@@ -103,12 +102,8 @@ class RecorderLoop:
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
-    def run(self, terminated: Callable[[], bool]) -> None:
-        """Work until told to quit or until the service process is gone; then finish the recording.
-
-        Args:
-            terminated: whether the process got SIGTERM.
-        """
+    def run(self) -> None:
+        """Work until told to quit or until the service process is gone; then finish the recording."""
         if self._preview is not None:
             self._preview.take_over(self._rig.triplet_shape)
         self._tell(RecorderReady())
@@ -119,7 +114,7 @@ class RecorderLoop:
         poll.register(self._control, select.POLLIN)
         for command in self._control.receive(0):  # commands that came together with the configuration ring no bell
             self._obey(command)
-        while not self._quit and not terminated():
+        while not self._quit:
             ready = {fd for fd, _ in poll.poll(self._sleep_ms(host_now()))}
             if self._doorbell in ready:
                 os.eventfd_read(self._doorbell)

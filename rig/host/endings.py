@@ -1,4 +1,4 @@
-"""Signals by which a program is told to end, and those that a terminal sends to every program of its window.
+"""Signals by which a program is told to end, and those that reach every process of a group at once.
 
 A signal that raises an exception may do so at any place, also where nothing clears up behind it. Programs with
 processes of their own count the signals instead, and look at the count where they wait.
@@ -6,13 +6,18 @@ processes of their own count the signals instead, and look at the count where th
 
 import ctypes
 import signal
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
 #: Ctrl-C, `kill` and systemd, and a terminal that is closed or an `ssh` that is dropped.
 ENDINGS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-_OF_THE_TERMINAL: Final = (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP)
+#: A terminal sends them to its window, systemd to a session or a scope, `timeout` to the group of its program.
+_OF_THE_GROUP: Final = (*ENDINGS, signal.SIGTSTP)
+#: A person does not ask twice within so long: he would have to press Ctrl-C ten times a second. `timeout` sends its
+#: signal to the program and at once again to the group of the program (timeout.c, GNU coreutils).
+_ONE_WISH_S: Final = 0.1
 
 _PR_SET_PDEATHSIG: Final = 1  # <linux/prctl.h>
 
@@ -25,16 +30,17 @@ def counted_endings(signals: tuple[signal.Signals, ...] = ENDINGS) -> Iterator[A
     """Within, signals that end a program are counted only. One that `nohup` has switched off stays so.
 
     A terminal that is closed is one wish to end, however often it is told: by the kernel, by the shell, by both. So
-    SIGHUP counts only if nothing has come before.
+    SIGHUP counts only if nothing has come before. Signals that come at once are one wish, too.
 
     Yields:
         A function that tells how often somebody has asked.
     """
-    caught: list[int] = []
+    caught: list[float] = []
 
     def heard(number: int, _: object) -> None:
-        if number != signal.SIGHUP or not caught:
-            caught.append(number)
+        now = time.monotonic()
+        if not caught or (number != signal.SIGHUP and now - caught[-1] > _ONE_WISH_S):
+            caught.append(now)
 
     wanted = [each for each in signals if each is not signal.SIGHUP or signal.getsignal(each) != signal.SIG_IGN]
     before = {number: signal.signal(number, heard) for number in wanted}
@@ -60,15 +66,15 @@ def heed(asks: Asks) -> None:
         raise KeyboardInterrupt
 
 
-def leave_terminal_to_parent() -> None:
-    """Ignore what a terminal sends to all programs of its window: the parent says what it means."""
-    for number in _OF_THE_TERMINAL:
+def leave_signals_to_parent() -> None:
+    """Ignore what reaches all processes of a group at once: the parent says what it means."""
+    for number in _OF_THE_GROUP:
         signal.signal(number, signal.SIG_IGN)
 
 
-def heed_terminal_again() -> None:
-    """Undo `leave_terminal_to_parent`."""
-    for number in _OF_THE_TERMINAL:
+def heed_signals_again() -> None:
+    """Undo `leave_signals_to_parent`."""
+    for number in _OF_THE_GROUP:
         signal.signal(number, signal.SIG_DFL)
 
 

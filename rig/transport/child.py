@@ -3,7 +3,6 @@
 import atexit
 import os
 import select
-import signal
 import socket
 import sys
 import threading
@@ -13,7 +12,7 @@ from typing import Any, Final, Generic, TypeVar
 
 import msgspec
 
-from rig.host.endings import be_killed_with_parent, leave_terminal_to_parent
+from rig.host.endings import be_killed_with_parent, leave_signals_to_parent
 from rig.transport.channel import ControlChannel
 from rig.transport.message import Quit
 
@@ -22,7 +21,6 @@ Config = TypeVar("Config")
 _CONFIG_S: Final = 10.0
 #: At the end of a process its last reports wait so long for a parent that does not read.
 _LAST_REPORTS_S: Final = 5.0
-_TURN_S: Final = 0.25
 _BAD_CONFIG: Final = 2
 _THREAD_FAILED: Final = 70  # EX_SOFTWARE of <sysexits.h>
 
@@ -44,7 +42,7 @@ class ChildContext(Generic[Config]):
         self.on_command: Callable[[Any], None] = lambda _: None
 
     def stopping(self) -> bool:
-        """Whether the parent asked to quit, is gone, or the process got SIGTERM.
+        """Whether the parent asked to quit, or is gone.
 
         From then on the process has its grace to end by itself, since a camera's driver may block for long on a camera
         that is dead.
@@ -67,31 +65,23 @@ class ChildContext(Generic[Config]):
             left = end - time.monotonic()
             if left <= 0:
                 return False
-            select.select([self.control], [], [], min(left, _TURN_S))  # SIGTERM does not end it
+            select.select([self.control], [], [], left)
         return True
-
-    def terminated(self) -> bool:
-        """Whether the process got SIGTERM. For a main loop that reads the control channel itself."""
-        return self._stop
-
-    def ask_to_stop(self, *_: object) -> None:
-        """Signal handler."""
-        self._stop = True
 
 
 def begin(
     config: type[Config], commands: Any, grace_s: float, *, killed_with_parent: bool = False
 ) -> ChildContext[Config]:
-    """Read the command line `NAME CONTROL_FD` and the configuration; install signal handlers and lifeline.
+    """Read the command line `NAME CONTROL_FD` and the configuration; ignore signals, install the lifeline.
 
-    Ctrl-C and Ctrl-Z in a terminal go to every process of the group. Children ignore them: the parent tells them what
-    to do, and while it is stopped, they go on.
+    Ctrl-C and Ctrl-Z in a terminal go to every process of the group, and SIGTERM where a session ends. Children ignore
+    them: the parent tells them what to do, and while it is stopped, they go on.
 
     Args:
         config: type of the configuration, which is the first message.
         commands: type of the commands that follow, or union of them.
         grace_s: time that the process has to finish its work after the parent is gone. 0: it has none to finish, so the
-            end of the parent and SIGTERM end it at once.
+            end of the parent ends it at once.
         killed_with_parent: let the kernel kill the process, frozen (SIGSTOP) or not, as soon as the *thread* that
             started it ends. The lifeline does not reach a frozen process.
 
@@ -112,9 +102,7 @@ def begin(
         raise SystemExit(f"{name}: no configuration came; this program is started by svev")
     atexit.register(control.drain, _LAST_REPORTS_S)
     context = ChildContext(name, control, first, grace_s)
-    leave_terminal_to_parent()
-    if grace_s > 0:
-        signal.signal(signal.SIGTERM, context.ask_to_stop)
+    leave_signals_to_parent()
     threading.Thread(target=_lifeline, args=(fd, grace_s), daemon=True, name="lifeline").start()
     return context
 

@@ -15,7 +15,7 @@ from typing import Final, NoReturn
 
 import msgspec
 
-from rig.host.endings import heed_terminal_again, leave_terminal_to_parent
+from rig.host.endings import heed_signals_again, leave_signals_to_parent
 from rig.transport.launcher import Import, Launch, Launched, Launcher, connection, take_over
 
 _REQUEST_BYTES: Final = 1 << 16
@@ -31,7 +31,7 @@ def main() -> None:
     asking: socket.socket | None = socket.socket(fileno=int(sys.argv[1]))
     command, launch = tuple(sys.orig_argv[:-1]), None
     while asking is not None:
-        leave_terminal_to_parent()
+        leave_signals_to_parent()
         _show_as(command)
         with asking:
             launch = _serve(asking)
@@ -149,7 +149,7 @@ def _fork_for_who_asks(*, own_group: bool) -> int:
 
 def _become(launch: Launch, descriptors: list[int]) -> None:
     """Have the place, the descriptors and the name that a program has which was started by its command line."""
-    heed_terminal_again()
+    heed_signals_again()
     numbers = (1, 2, *launch.numbers)
     moved = list(descriptors)
     for place in range(len(moved)):

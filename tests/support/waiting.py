@@ -28,3 +28,9 @@ def wait_until(condition: Callable[[], bool], what: str, timeout_s: float = 5.0,
         if waited > timeout_s:
             raise AssertionError(f"after {timeout_s} s still not so: {what}")
         time.sleep(max(poll_s, min(_SHARE * waited, _RAREST_S)))
+
+
+def let_pass(seconds: float) -> None:
+    """Let so much time pass, for what depends on nothing else."""
+    until = time.monotonic() + seconds
+    wait_until(lambda: time.monotonic() > until, f"{seconds} s pass", seconds + 10)

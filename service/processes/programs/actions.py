@@ -8,7 +8,7 @@ from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase
 from rig.settings.trigger import ActionTrigger
 from rig.transport.channel import ControlChannel
-from rig.transport.child import ChildContext, begin
+from rig.transport.child import begin
 from rig.transport.message import Quit
 from rig.transport.recorder_commands import TellActions
 from rig.transport.trigger_messages import CamerasSeen, LetPulses, TriggerCommand, TriggerConfig, TriggerTold
@@ -34,19 +34,19 @@ def main() -> None:
     sender = ActionSender(rig.trigger, child.config.epoch, cameras, gate)
     sender.start()
     try:
-        _attend(child, sender, gate)
+        _attend(child.control, sender, gate)
     finally:
         sender.stop()
 
 
-def _attend(child: ChildContext[TriggerConfig], sender: ActionSender, gate: Gate) -> None:
+def _attend(control: ControlChannel[TriggerCommand], sender: ActionSender, gate: Gate) -> None:
     """Read answers and orders, and report, until told to quit or until the service is gone."""
-    control, next_report = child.control, HostNs(0)
+    next_report = HostNs(0)
     poll = select.poll()
     poll.register(sender, select.POLLIN)
     poll.register(control, select.POLLIN)
     quitting = False
-    while not (quitting or control.ended or child.terminated()):
+    while not (quitting or control.ended):
         poll.poll(_TURN_MS)
         for command in control.receive(0):
             match command:

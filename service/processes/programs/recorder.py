@@ -20,7 +20,7 @@ def main() -> None:
     except SvevError as error:
         child.control.send(RecorderFailed.of(error))
         raise SystemExit(error.exit_code) from None
-    loop.run(child.terminated)
+    loop.run()
 
 
 if __name__ == "__main__":

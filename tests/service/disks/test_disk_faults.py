@@ -10,7 +10,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from tests.service.serving import PATIENCE_S, Serving, serving
 from tests.support.faulty_disk import SMALL, Call, FaultyDisk
 from tests.support.loopback import Loopback
 from tests.support.reliability import FaultTable
-from tests.support.waiting import wait_until
+from tests.support.waiting import let_pass, wait_until
 
 pytestmark = pytest.mark.long
 
@@ -187,12 +186,6 @@ def test_a_disk_that_hangs_across_the_end_costs_no_tag(
 def _last(err: str) -> str:
     """The last line that was said."""
     return err.strip().splitlines()[-1]
-
-
-def let_pass(seconds: float) -> None:
-    """Let so much time pass, for what depends on nothing else."""
-    until = time.monotonic() + seconds
-    wait_until(lambda: time.monotonic() > until, f"{seconds} s pass", seconds + 10)
 
 
 def test_the_page_says_that_the_disk_was_too_slow(tmp_path: Path, loopback: Loopback, disk: FaultyDisk) -> None:

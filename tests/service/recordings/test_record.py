@@ -223,6 +223,24 @@ def test_a_terminal_that_is_closed_ends_the_recording_properly(
     fault_table.tell(PROCESSES, what, lost=0, said='"stopped_early": true', code=code)
 
 
+@pytest.mark.parametrize("number", repeats([signal.SIGTERM, signal.SIGINT]))
+def test_a_signal_to_all_processes_at_once_ends_the_recording_properly(
+    tmp_path: Path, loopback: Loopback, number: signal.Signals
+) -> None:
+    """As `timeout` sends it, to the program and then to its group, and systemd where a session ends."""
+    command = [sys.executable, "-m", "svev", "record", "--rig", str(write_rig(tmp_path, "sim", loopback)), "--json"]
+    process = subprocess.Popen(
+        [*command, "--seconds", "60", "--out", str(tmp_path / "logs")], stdout=subprocess.PIPE, start_new_session=True
+    )
+    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    process.send_signal(number)
+    os.killpg(process.pid, number)
+    result = json.loads(process.communicate(timeout=60)[0])
+    assert (process.returncode, result["stopped_early"]) == (0, True)
+    checked = verify(Path(result["log"]))
+    assert (checked.verdict, checked.ended_early) == ("clean", "")
+
+
 def test_a_full_disk_behind_standard_error_ends_no_recording(tmp_path: Path, loopback: Loopback) -> None:
     rig, out = write_rig(tmp_path, "sim", loopback), tmp_path / "logs"
     command = [sys.executable, "-m", "svev", "record", "--rig", str(rig), "--seconds", "1", "--out", str(out), "--json"]

@@ -5,10 +5,12 @@ everything that people read goes through `visible`.
 """
 
 import json
+import os
 import sys
 import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import IO, Any, Final, cast
 
 from rich.console import Console
@@ -79,6 +81,16 @@ def say(line: str, *, aside: bool = False) -> None:
         return
     with _to_standard_output():
         _stdout.print(visible(line), markup=False)
+
+
+def say_if_heard(line: str) -> None:
+    """Print one line for people of a program that goes on: that nobody can read it ends nothing."""
+    try:
+        sys.stdout.write(visible(line) + "\n")
+        sys.stdout.flush()
+    except OSError:  # what is left of the line would fail again at the end of the program
+        with Path(os.devnull).open("w", encoding="utf-8") as nothing:
+            os.dup2(nothing.fileno(), sys.stdout.fileno())
 
 
 def say_text(text: str) -> None:

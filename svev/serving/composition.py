@@ -293,7 +293,7 @@ class _Reporter:
         supervisor, notify = self._supervisor, self._notify
         if self._server.started and not self._greeted:
             self._greeted = True
-            console.say(f"svev: panel at {self._panel}")
+            console.say_if_heard(f"svev: panel at {self._panel}")
             notify.ready()
         notify.status(f"{supervisor.status.state}: {supervisor.status.statement.text}")
         if supervisor.answering:

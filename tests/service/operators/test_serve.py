@@ -78,6 +78,16 @@ def test_a_signal_while_recording_finishes_the_file(
     )
 
 
+@pytest.mark.parametrize("place", ["> >(true)", "> /dev/full"])
+def test_nobody_reads_the_address_of_the_panel_and_the_service_goes_on(
+    tmp_path: Path, loopback: Loopback, place: str
+) -> None:
+    prefix = ("bash", "-c", f'exec "$@" {place}', "svev")
+    with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback, prefix=prefix) as service:
+        service.arm()
+        assert service.get("/api/status")["state"] == "armed"
+
+
 def test_signals_that_keep_coming_do_not_spoil_the_end(tmp_path: Path, loopback: Loopback) -> None:
     with serving(tmp_path, write_rig(tmp_path, "sim", loopback), loopback) as service:
 

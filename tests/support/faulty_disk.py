@@ -6,13 +6,13 @@ is real: the program, its threads, its files.
 
 import errno
 import mmap
-import os
 import struct
-import subprocess
 from collections.abc import Mapping
 from enum import IntFlag
 from pathlib import Path
 from typing import Final
+
+from tests.support.preloaded import compiled, preloading
 
 _SOURCE: Final = Path(__file__).with_suffix(".c")
 #: As `struct faults` in the library: calls, error, least, most, hang, rate, skip, hit, only.
@@ -40,20 +40,7 @@ class FaultyDisk:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._library, control = folder / "faulty_disk.so", folder / "faulty_disk.control"
-        command = [
-            "gcc",
-            "-shared",
-            "-fPIC",
-            "-O1",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            str(_SOURCE),
-            "-o",
-            str(self._library),
-        ]
-        subprocess.run([*command, "-ldl", "-lpthread"], check=True, timeout=60)
+        self._library, control = compiled(_SOURCE, folder), folder / "faulty_disk.control"
         control.write_bytes(bytes(mmap.PAGESIZE))
         self._control = control
         with control.open("r+b") as file:
@@ -62,8 +49,7 @@ class FaultyDisk:
     @property
     def environment(self) -> Mapping[str, str]:
         """Variables of the environment that put the library into a program and its children."""
-        preload = " ".join([str(self._library), *filter(None, [os.environ.get("LD_PRELOAD")])])
-        return {"LD_PRELOAD": preload, "SVEV_TEST_DISK": str(self._control)}
+        return {**preloading(self._library), "SVEV_TEST_DISK": str(self._control)}
 
     @property
     def hits(self) -> int:

@@ -32,7 +32,7 @@ from analysis.result.model import (
 from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.host.disk import replace_file
-from rig.host.files import TEXT_MAX, read_whole
+from rig.host.files import TEXT_MAX, UntrustedFileError, read_whole
 from rig.phrase import Phrase
 from rig.transport import wire
 
@@ -70,6 +70,8 @@ def read(path: Path) -> MeasuredRecording:
         content = read_whole(path, TEXT_MAX, links=True)
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; name a folder that svev analyze wrote") from None
+    except UntrustedFileError as error:
+        raise BadInputError(f"{path}: {error.strerror}; name a folder that svev analyze wrote") from None
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
     try:

@@ -19,6 +19,7 @@ from recorder.log.coded_image import CodedImage, coded_schema
 from recorder.log.ffv1 import CODEC, Encoder
 from recorder.log.index import LogIndex
 from recorder.log.mcap_layout import MAGIC, RECORD, chunk_of, message_head, pixels_field, records
+from recorder.log.write_lock import is_being_written
 from recorder.reading.coded_images import is_image, records_crc
 from recorder.reading.items import Chunk, Message, SmallRecord
 from recorder.reading.log_reader import LogReader, stream
@@ -89,6 +90,8 @@ def compact(source: Path, target: Path, progress: Callable[[int], None] | None =
         raise BadInputError(f"{target.parent}: no such directory; make it, or choose another one")
     done = progress or (lambda _: None)
     with LogReader(source) as reader:
+        if not reader.closed and is_being_written(source):
+            raise LogDamagedError(f"{source}: is still being written; compact it when the recording has ended")
         if not reader.closed:
             raise LogDamagedError(f"{source}: was not closed; {_MAKE_WHOLE}")
         with unfinished_log(target) as path:

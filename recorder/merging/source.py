@@ -60,6 +60,8 @@ def look_at(path: Path) -> Part:
         LogDamagedError: it was not closed, is damaged, or lacks tags.
     """
     about = info(path)
+    if about.being_written:
+        raise LogDamagedError(f"{path}: is still being written; merge it when the recording has ended")
     if not about.closed or about.damaged_bytes:
         raise LogDamagedError(
             f"{path}: was not closed, or is damaged: make a whole log of it with `svev recover`, and merge that one"

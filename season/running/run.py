@@ -1,6 +1,7 @@
 """Measures what is not measured yet of a campaign."""
 
 import fcntl
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -15,6 +16,7 @@ from season.running.stores import Options, read_outcomes
 from season.running.task import give_up, measure
 
 _LOCK: Final = ".lock"
+_LOCK_FLAGS: Final = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
 
 @contextmanager
@@ -27,7 +29,7 @@ def alone(campaign: Campaign) -> Iterator[None]:
     """
     try:
         campaign.out.mkdir(parents=True, exist_ok=True)
-        lock = (campaign.out / _LOCK).open("w")
+        lock = os.fdopen(os.open(campaign.out / _LOCK, _LOCK_FLAGS, 0o644), "w")
     except OSError as error:
         raise StorageError(f"{campaign.out}: cannot be written ({error.strerror}); choose another folder") from error
     with lock:

@@ -12,7 +12,10 @@ from typing import Any
 
 import pytest
 
+from rig.errors import StorageError
+from season.campaign import read_campaign
 from season.running.outcome import LogState, decoded
+from season.running.run import alone
 from season.running.stores import OUTCOME
 from tests.analysis.measured import measured_jump
 from tests.season.files import campaign_file, log_file
@@ -52,6 +55,17 @@ def contents(folder: Path) -> dict[str, bytes]:
 def begun(folder: Path) -> list[Path]:
     """Results that are being written."""
     return [path for path in folder.glob(".*.season.*") if path.is_dir()]
+
+
+def test_a_link_of_the_name_of_the_lock_is_not_followed(tmp_path: Path) -> None:
+    target = tmp_path / "target"
+    target.write_text("somebody's")
+    campaign = read_campaign(campaign_file(tmp_path))
+    campaign.out.mkdir(parents=True)
+    (campaign.out / ".lock").symlink_to(target)
+    with pytest.raises(StorageError, match="cannot be written"), alone(campaign):
+        pass
+    assert target.read_text() == "somebody's"
 
 
 @pytest.mark.long

@@ -1,6 +1,7 @@
 """Certificates of one's own: a service that speaks HTTPS, and clients that verify it against the CA."""
 
 import json
+import os
 import ssl
 import subprocess
 from contextlib import closing
@@ -85,6 +86,10 @@ def test_what_cannot_be_used_is_said_before_the_service_starts(
         Tls.of(files.certificate, files.authority_key)
     with pytest.raises(BadInputError, match="No such file"):
         Tls.of(tmp_path / "none", files.key)
+    os.mkfifo(tmp_path / "pipe")
+    for pair in ((tmp_path / "pipe", files.key), (files.certificate, tmp_path / "pipe")):
+        with pytest.raises(BadInputError, match="is no file, but a device or a pipe"):
+            Tls.of(*pair)
     for name in ("", "two words", "x/CN=y", "-a", "a,DNS:b"):
         assert cli.main(["certificate", "--name", name, "--out", str(tmp_path / "other")]) == 2
     assert not (tmp_path / "other").exists()

@@ -34,6 +34,27 @@ def test_a_log_in_the_making_is_no_whole_recording_and_no_cut_off_copy(
     buffers.close()
 
 
+def test_a_log_in_the_making_is_neither_compacted_nor_merged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """To recover it, as one does with a log that was not closed, would give a part of the recording."""
+    path, whole, out, buffers = (
+        (tmp_path / "now.mcap"),
+        tmp_path / "whole.mcap",
+        tmp_path / "new.mcap",
+        TripletBuffers(SHAPE, 4),
+    )
+    write_log(whole, (ALL_OK,))
+    with open_writer(path, buffers) as log:
+        write_pulse(log, buffers, make_tag(1))
+        wait_until(lambda: log.pulses == 1, "the pulse is in the file")
+        for command in (["compact", path], ["merge", path, whole], ["merge", whole, path]):
+            assert main([*map(str, command), "-o", str(out)]) == 3
+            assert f"{path}: is still being written; {command[0]} it when the recording has" in capsys.readouterr().err
+    buffers.close()
+    assert not out.exists()
+
+
 def test_what_is_recovered_of_a_log_in_the_making_says_that_more_came(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,10 +1,12 @@
 """The certificate with which the panel speaks HTTPS itself."""
 
+import os
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
 from rig.errors import BadInputError
+from rig.host.files import open_regular
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,8 @@ class Tls:
                 "--tls-certificate and --tls-key belong together: give both; svev certificate makes them"
             )
         try:
+            for each in (certificate, key):
+                os.close(open_regular(each, links=True))  # OpenSSL would wait for a pipe
             # An encrypted key would have OpenSSL ask at the terminal, which a service has not: an empty answer fails.
             ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
         except OSError as error:

@@ -24,7 +24,7 @@ from rig.tag import TripletTag
 from rig.transport.recorder_reports import CameraNews
 from triggering.ledger.recounted import Difference, Recounted
 from triggering.ledger.source_recount import SourceRecount
-from triggering.ledger.stretches import Run, shifts, stretches
+from triggering.ledger.stretches import FRAMES, Run, shifts, stretches
 from triggering.ledger.tagged_frames import TaggedFrame, frame_of, goes_on, id_step, is_of_another_pulse, recomputed
 
 #: News after which numbers and clock of a camera prove nothing about the frames before it.
@@ -83,6 +83,18 @@ class _Camera:
     def scatter(self) -> int:
         """By how much the arrivals of its frames vary, ns."""
         return 0 if self.soonest is None else self.latest - self.soonest
+
+    def comes_back(self, last: TaggedFrame, frame: TaggedFrame, nearest: int) -> bool:
+        """Whether the last frame is the one that is filed under a wrong pulse, as its arrival says.
+
+        It came otherwise than the first frames of the log, which are taken to be right, and this one came as they did.
+        """
+        first = self.runs[0]
+        if first.frames < FRAMES:
+            return False
+        usual = first.late / first.frames
+        last_off, off = (abs(each.host - each.time - usual) for each in (last, frame))
+        return off < nearest / 2 < last_off
 
     def gain(self) -> float:
         """How much faster than the pulses' clock the camera's runs, as a factor."""
@@ -182,7 +194,11 @@ class Recount:
             if cut and (frames := _slept_through(camera, last, frame, off)):
                 why = f"{frames} frames that its numbers tell of came while this computer's clock stood still"
                 self._differs(Difference(last.pulse, camera.name, FrameStatus.OK, None, why))
-            elif cut and is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between):
+            elif (
+                cut
+                and not camera.comes_back(last, frame, nearest)
+                and is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between)
+            ):
                 why = f"clock and number say that it was triggered {abs(off) / 1e6:.1f} ms "
                 why += "after this pulse" if off > 0 else "before this pulse"
                 self._is_elsewhere(camera, frame.pulse, why, round(off / nearest))

@@ -13,7 +13,7 @@ from typing import Final
 from rig.pulse import PulseNumber
 
 #: So many frames tell how much the arrivals of a camera scatter.
-_FRAMES: Final = 8
+FRAMES: Final = 8
 #: The soonest of n arrivals lies beyond half a period by chance with a probability of exp(-n p / 2 m), where m is their
 #: mean excess over the soonest possible one and p the period, if they are exponential, and less often if they are
 #: bounded. n p / m must be so large that this is below 1e-4.
@@ -89,7 +89,7 @@ def shifts(runs: Sequence[Run]) -> list[int]:
             shift = low = high = 0
         low, high = low + min(0, run.excess), high + max(0, run.excess)
         # A camera may miss pulses where its times come back: the numbers only bound what arrivals tell.
-        if (low == high and not shift) or usual.frames < _FRAMES:
+        if (low == high and not shift) or usual.frames < FRAMES:
             own: int | None = 0
         else:
             own = _shift(usual, run)

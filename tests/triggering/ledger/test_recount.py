@@ -134,6 +134,22 @@ def test_a_stretch_of_frames_of_other_pulses_is_named_whole(
     assert (found["pulse"], found["last_pulse"], found["by_pulses"]) == (stretch.pulse, stretch.last, by)
 
 
+@pytest.mark.parametrize("at_miss", [True, False])
+def test_right_frames_behind_mixed_ones_are_not_accused(at_miss: bool) -> None:
+    """K2's clock is set back by one period, and is believed for nine pulses more: its frames behind them are right."""
+    faults = {(149, 1): MISSED} if at_miss else {}
+    right = tags_of(Run(Hill(Scenario(seed=2, pulses=400, faults=faults))).closed)
+    assert recount(right).agrees
+    tags, period_ns = slipped(right, 150, 158, 1), right[200].time - right[199].time
+    for tag in tags[159:]:
+        part = tag.cameras[1]
+        assert part.device_time is not None
+        set_back = msgspec.structs.replace(part, device_time=DeviceNs(part.device_time - period_ns))
+        tags = changed(tags, tag.pulse, lambda _, part=set_back: part)  # type: ignore[misc]
+    for each in recount(tags).misfiled:
+        assert 149 <= each.pulse <= (each.last or each.pulse) <= 159
+
+
 def test_a_pulse_without_any_tag_is_noticed(tags: list[TripletTag]) -> None:
     rest = [tag for tag in tags if tag.pulse != 50]
     assert recount(rest).agrees, "its number is missing, which `verify` says"

@@ -93,7 +93,8 @@ class FrameTimes:
         time = self.trigger_time(device)
         if arrival <= self._unsettled_until:
             return Unusable.UNSETTLED
-        if time > arrival + self._train.widest_ns:
+        early_ns = min(max(self._train.tolerance_ns, 2 * uncertainty_ns), self._train.widest_ns)
+        if time > arrival + early_ns:  # no frame comes before its trigger
             return Unusable.REJECTED
         return Unusable.UNSETTLED if self.stamping.contradicts(time, arrival, 2 * uncertainty_ns) else time
 

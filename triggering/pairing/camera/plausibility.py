@@ -20,8 +20,6 @@ from triggering.timeline.pulse_train import PulseTrain
 
 #: A camera's first frames are accepted: the rig warms up, and no rhythm is known by which they could be judged.
 _FIRST: Final = 16
-#: Likelihood ratio (logarithm) of shifted arrivals that the first frame after a doubt must stay below.
-_SHIFTED: Final = 3.0
 #: Frames in a row that end a doubt, and that end the wait where nothing contradicts them.
 _SEVERAL: Final = 8
 #: So many frames of a group are enough to judge it by.
@@ -153,8 +151,12 @@ class Plausibility:
         return evidence.arrivals.confirms and self._is_first_sound(evidence)
 
     def _is_first_sound(self, evidence: _Evidence) -> bool:
-        """Whether the first frame alone may have come as usual."""
-        return self._arrivals.test([evidence.waiting[0].latency_ns]).shifted < _SHIFTED
+        """Whether the first frame alone came nearer to its own pulse than to a neighbouring one."""
+        return self._arrivals.is_usual(evidence.waiting[0].latency_ns)
+
+    def _is_first_against(self, evidence: _Evidence) -> bool:
+        """Whether the arrival of the first frame alone speaks against its time, whatever came behind it."""
+        return self._arrivals.test([evidence.waiting[0].latency_ns]).speaks_against
 
     def _judge_in_turn(self, evidence: _Evidence) -> Verdict:
         """Judge a frame that goes on from the last one in number and time, but did not come as usual."""
@@ -175,10 +177,11 @@ class Plausibility:
             has_room = self._has_room(evidence)
             if not has_room and (evidence.closed or several or evidence.final):
                 return Verdict.REJECTED
-            if evidence.closed and arrivals.speaks_against:
+            against = arrivals.speaks_against or self._is_first_against(evidence)
+            if against and (evidence.closed or evidence.final):
                 return Verdict.REJECTED
             no_more = evidence.final or self._arrivals.scatter
-            enough = no_more and not arrivals.speaks_against and has_room
+            enough = no_more and not against and has_room
         return self._judge_place(evidence) if enough and evidence.read else Verdict.WAITS
 
     def _judge_place(self, evidence: _Evidence) -> Verdict:

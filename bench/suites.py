@@ -18,7 +18,7 @@ from bench.photogrammetry.adjustment import run_adjustment
 from bench.photogrammetry.gross_errors import run_gross_errors
 from bench.photogrammetry.intersection import run_intersection
 from bench.photogrammetry.planning import run_planning
-from bench.recording.capture import run_capture
+from bench.recording.capture import SPLIT, run_capture
 from bench.recording.firewire import run_firewire
 from bench.recording.gstreamer import SINKS
 from bench.recording.loads import LOADS, MANY
@@ -49,8 +49,8 @@ def _many(name: str, seconds: float, directory: Path) -> dict[str, Any]:
 
 
 def _capture_table(result: dict[str, Any]) -> list[str]:
-    lines = [f"{result['MB_per_s']} MB/s for {result['seconds']:g} s", f"{'':22}{'CPU-s/GB':>9}{'MB/s':>8}  triplets"]
-    for name in ("svev", "svev, one subscriber", *SINKS):
+    lines = [f"{result['MB_per_s']} MB/s for {result['seconds']:g} s", f"{'':28}{'CPU-s/GB':>9}{'MB/s':>8}  triplets"]
+    for name in ("svev", "svev, one subscriber", SPLIT, *SINKS):
         case = result[name]
         triplets = f"{case['complete']} of {case['pulses']}" if "pulses" in case else ""
         if "latency_ms" in case:
@@ -58,7 +58,7 @@ def _capture_table(result: dict[str, Any]) -> list[str]:
             triplets += f"; subscriber got {case['received']}; latency, median and 99 %, from the frame in memory "
             triplets += f"{memory['median']} and {memory['p99']} ms, "
             triplets += f"from the last packet sent {cable['median']} and {cable['p99']} ms"
-        lines.append(f"{name:22}{case['cpu_s_per_GB']:9.3f}{case['MB_per_s']:8.1f}  {triplets}")
+        lines.append(f"{name:28}{case['cpu_s_per_GB']:9.3f}{case['MB_per_s']:8.1f}  {triplets}")
     return lines + [f"{name}: {ratio}" for name, ratio in result["ratios"].items()]
 
 

@@ -217,7 +217,7 @@ class Service(Archive):
     def delete_recording(self, recording_id: str) -> Recording:
         """Put a recording into the trash."""
         current = self._supervisor.now.recordings.current
-        if current is not None and current.id == recording_id:
+        if current is not None and recording_id in current.ids[current.first :]:
             raise StateForbidsError(
                 phrase(
                     "recording_in_progress",
@@ -225,11 +225,17 @@ class Service(Archive):
                     recording=recording_id,
                 )
             )
+        later = self._catalogue.entry(recording_id).parts[:0:-1]  # the last one first: what is left is the beginning
+        for part in later:
+            self._catalogue.delete(part)
         return self._with_next_part(self._catalogue.delete(recording_id))
 
     def restore_recording(self, recording_id: str) -> Recording:
         """Take a recording out of the trash."""
+        parts = self._catalogue.entry(recording_id, prefer_deleted=True).parts
         entry = self._catalogue.restore(recording_id)
+        for part in parts[1:]:
+            self._catalogue.restore(part)
         self._measurings.restored(recording_id, self._catalogue.file(recording_id))
         return self._with_next_part(entry)
 

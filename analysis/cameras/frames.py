@@ -7,7 +7,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.frame import FrameStatus
 from rig.images.picture import Grey, measurable
@@ -39,7 +39,7 @@ class LogFrames:
 
     def __init__(self, log: Path) -> None:
         self._log = log
-        with LogReader(log) as reader:
+        with RecordingReader(log) as reader:
             stored = stored_triplets(reader)
         self._stored: dict[PulseNumber, StoredTriplet] = {triplet.tag.pulse: triplet for triplet in stored}
 
@@ -50,7 +50,7 @@ class LogFrames:
 
     def frames(self, pulses: Collection[int]) -> Iterator[tuple[PulseNumber, Frames]]:
         """The frames of some pulses, in order; cameras without one are left out."""
-        with LogReader(self._log) as reader:
+        with RecordingReader(self._log) as reader:
             for pulse in self.pulses:
                 if pulse not in pulses:
                     continue

@@ -19,7 +19,7 @@ from analysis.candidates.markers.known_discs import DiscShape, Windows, fit_know
 from analysis.candidates.markers.spots import MOST, find_expected, find_spots, look_for_spots
 from analysis.candidates.model import Expected, ImageCandidates, PulseCandidates, Spots
 from analysis.scene.static_image import StaticImage
-from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.triplets import stored_triplets, triplets
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
@@ -222,7 +222,7 @@ def find_candidates(
     """
     total = 0
     if progress is not None:
-        with LogReader(log) as reader:
+        with RecordingReader(log) as reader:
             total = len(stored_triplets(reader))
     found = []
     for tag, image in triplets(log):

@@ -16,7 +16,7 @@ from analysis.candidates.foreground.background import Background
 from analysis.measurements.model import Measurements
 from analysis.procedure.log_facts import log_facts
 from analysis.scene.static_image import StaticImage, static_images
-from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.triplets import stored_pulses
 from rig.clocks import UtcNs
 from rig.errors import UnknownCameraError, UnknownRecordingError
@@ -63,7 +63,7 @@ class OpenedLog:
     def __init__(self, log: Path) -> None:
         self.path = log
         self.facts = log_facts(log)
-        with LogReader(log) as reader:
+        with RecordingReader(log) as reader:
             stored = {int(tag.pulse): (tag, triplet) for tag, triplet in stored_pulses(reader)}
         found = {pulse: tag for pulse, (tag, _) in stored.items()}
         self.pulses = sorted(found)
@@ -187,7 +187,7 @@ class OpenedLog:
                 return self._frames[pulse]
             found: tuple[dict[str, Grey], dict[str, NDArray[np.uint8]]] = ({}, {})
             if (triplet := self._stored.get(pulse)) is not None:
-                with LogReader(self.path) as reader:
+                with RecordingReader(self.path) as reader:
                     try:
                         image = triplet.image(reader)
                         grey, picture = measurable(image, triplet.tag.pixels), shown(image, triplet.tag.pixels)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from analysis.film.whole import whole_file
 from analysis.film.words import FONT, write_outlined
 from analysis.images.activity import liveliest
-from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.clocks import NS_PER_S
 from rig.errors import LogDamagedError
@@ -50,7 +50,7 @@ def write_contact_sheet(log: Path, out: Path, count: int = 12, *, pulses: range 
         StorageError: the disk is full or fails.
         LogDamagedError: the log holds no image.
     """
-    with LogReader(log) as reader:
+    with RecordingReader(log) as reader:
         triplets = [each for each in stored_triplets(reader) if pulses is None or each.tag.pulse in pulses]
         if not triplets:
             raise LogDamagedError(

@@ -9,6 +9,7 @@ import numpy as np
 
 from recorder.reading.info import LogInfo, info
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets, tags
 from rig.api.export import LOSSLESS, ExportOrder
 from rig.clocks import UtcNs
@@ -63,7 +64,7 @@ class Recording:
     """
 
     def __init__(self, log: Path, order: ExportOrder) -> None:
-        found = info(log)
+        found = info(log, whole=True)
         self.log, self.session = log, found.session
         self.rate_hz = found.ledger.rate_hz or 1.0
         self._tags: dict[int, TripletTag] = {}
@@ -99,7 +100,7 @@ class Recording:
         Raises:
             BadInputError: the disk cannot read the log, or its images are not all of one size.
         """
-        with LogReader(self.log, skim=True) as reader:
+        with RecordingReader(self.log, skim=True) as reader:
             stored: dict[int, StoredTriplet] = {}
             for triplet in stored_triplets(reader):
                 stored.setdefault(int(triplet.tag.pulse), triplet)

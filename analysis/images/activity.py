@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.errors import LogDamagedError, UnknownRecordingError
 from rig.frame import FrameStatus
@@ -38,7 +39,7 @@ def liveliest_pulse(log: Path) -> int:
         BadInputError: the log cannot be read.
         LogDamagedError: one of the images that were compared is damaged.
     """
-    with LogReader(log, skim=True) as reader:
+    with RecordingReader(log, skim=True) as reader:
         stored = stored_triplets(reader)
         shown = [triplet for triplet in stored if triplet.tag.complete] or [
             triplet for triplet in stored if any(camera.status is FrameStatus.OK for camera in triplet.tag.cameras)
@@ -57,7 +58,7 @@ def busiest_pulse(log: Path) -> int | None:
     Raises:
         BadInputError: the log cannot be read.
     """
-    with LogReader(log, skim=True) as reader:
+    with RecordingReader(log, skim=True) as reader:
         shown = [triplet for triplet in stored_triplets(reader) if triplet.tag.complete]
         if not shown:
             return None

@@ -8,7 +8,7 @@ from typing import Any
 
 from analysis.measurements.model import MeasuredCamera
 from recorder.reading.info import LogInfo, imported_in_words, info
-from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from rig.errors import BadInputError
 from rig.phrase import Phrase, phrase
 from rig.settings.camera import CameraSettings
@@ -48,7 +48,7 @@ def log_facts(path: Path) -> LogFacts:
     Raises:
         BadInputError: no such file, no log of ours, or a log without pulses.
     """
-    about = info(path)
+    about = info(path, whole=True)
     if about.first is None:
         text = "{log}: holds no pulse, so there is nothing to analyze; choose another recording"
         raise BadInputError(phrase("log_no_pulse", text, log=str(path)))
@@ -94,7 +94,7 @@ def _rate_hz(about: LogInfo) -> float:
 
 def _cameras(path: Path) -> list[dict[str, Any]]:
     """The cameras as the rig file in the log gives them."""
-    with LogReader(path) as reader:
+    with RecordingReader(path) as reader:
         for _ in reader.items():
             if RIG_ATTACHMENT in reader.attachments:
                 break

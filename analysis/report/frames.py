@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.triplets import stored_triplets
 from rig.images.picture import shown
 from rig.tag import TripletTag
@@ -23,7 +23,7 @@ def frames_of(log: Path, pulses: Collection[int]) -> Iterator[tuple[TripletTag, 
         BadInputError: no such file, no MCAP log, or not one of ours.
     """
     wanted = frozenset(pulses)
-    with LogReader(log, skim=True) as reader:
+    with RecordingReader(log, skim=True) as reader:
         for stored in stored_triplets(reader):
             if stored.tag.pulse in wanted:
                 try:

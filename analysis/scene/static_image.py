@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.triplets import StoredTriplet, stored_triplets
 from rig.arrays import Floats
 from rig.errors import LogDamagedError
@@ -86,7 +87,7 @@ def static_images(log: Path, pulses: range | None = None, frames: int = FRAMES) 
         BadInputError: no such log.
         LogDamagedError: no camera has a frame there, or an image is damaged.
     """
-    with LogReader(log) as reader:
+    with RecordingReader(log) as reader:
         stored = [t for t in stored_triplets(reader) if pulses is None or t.tag.pulse in pulses]
         if not stored:
             raise LogDamagedError(

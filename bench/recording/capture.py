@@ -6,18 +6,23 @@ The simulated cameras are the same for all, and are not counted.
 import time
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from bench.recording.gstreamer import SINKS, run_gstreamer
 from bench.recording.loads import PRERENDERED, Load
 from bench.recording.processes import cpu_seconds
 from recorder.publishing.subscriber import median_and_p99, subscriber
+from recorder.reading.parts import parts_of
 from rig.api.recordings import Counts
 from rig.clocks import HostNs, UtcAnchor, UtcNs, host_now
 from service.headless import HeadlessRig
 from service.processes.simulation import simulated_hill
 from service.recordings.storage import new_log_path
 from simrig.programs.simulated_hill import SimulatedHill
+
+#: A recording that is split, and how many parts it has.
+SPLIT: Final = "svev, split, one subscriber"
+_PARTS: Final = 4
 
 
 def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> dict[str, Any]:
@@ -32,6 +37,7 @@ def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> di
         result: dict[str, Any] = {"load": load.name, "MB_per_s": round(load.bytes_per_s / 1e6, 1), "seconds": seconds}
         result["svev"] = _record(load, seconds, directory, publish)
         result["svev, one subscriber"] = _record(load, seconds, directory, publish, hill)
+        result[SPLIT] = _record(load, seconds, directory, publish, hill, seconds / _PARTS)
         for sink in SINKS:
             result[sink] = run_gstreamer(load, rig, sink, seconds, directory)
     ours = result["svev"]["cpu_s_per_GB"]
@@ -40,10 +46,15 @@ def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> di
 
 
 def _record(
-    load: Load, seconds: float, directory: Path, publish: str, subscribed_hill: SimulatedHill | None = None
+    load: Load,
+    seconds: float,
+    directory: Path,
+    publish: str,
+    subscribed_hill: SimulatedHill | None = None,
+    part_s: float | None = None,
 ) -> dict[str, Any]:
-    """One recording; the log is removed afterwards. With a hill, a subscriber counts and measures latencies."""
-    rig = load.rig(directory, publish)
+    """One recording; its logs are removed afterwards. With a hill, a subscriber counts and measures latencies."""
+    rig = load.rig(directory, publish).split(part_s, None)
     path = new_log_path(directory)
     pulses = round(seconds * load.rate_hz)
     try:
@@ -62,7 +73,8 @@ def _record(
                 figures["latency_from_cable_ms"] = _latency_from_cable(counted.arrivals, subscribed_hill)
             return figures
     finally:
-        path.unlink(missing_ok=True)
+        for part in parts_of(path):
+            part.unlink(missing_ok=True)
 
 
 def _latency_from_cable(arrivals: list[tuple[int, int]], hill: SimulatedHill) -> dict[str, float | None]:

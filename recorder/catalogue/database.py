@@ -31,7 +31,7 @@ _IN_THE_WAY: Final = frozenset(
     {sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED, sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN}
 )
 #: Counts up when rows of the same log become different ones.
-_FORMAT: Final = 1
+_FORMAT: Final = 2
 _VERSION: Final = crc32(f"{version('svev')}.{_FORMAT}".encode()) & 0x7FFF_FFFF
 
 #: Main figures of a jump that are searched for, as `rig.api.jump.LastJump` names them.
@@ -40,7 +40,7 @@ _COLUMNS: Final = {
     "logs": ("path", "keys", "plain", "entry"),
     "recordings": (
         "path", "id", "deleted", "growing", "time_ns", "duration_s", "level", "athlete", "bib", "bib_number",
-        "favourite", "tags", "continues", "hill", "text", "session", "said",
+        "favourite", "tags", "continues", "part", "hill", "text", "session", "said",
     ),
     "jumps": ("path", "jump", "time_ns", "live", "ok", *FIGURES, "content"),
 }  # fmt: skip
@@ -48,8 +48,8 @@ _SCHEMA: Final = f"""
 CREATE TABLE logs (path TEXT PRIMARY KEY, keys BLOB, plain BLOB, entry BLOB, checksum INTEGER) WITHOUT ROWID;
 CREATE TABLE recordings (
   path TEXT PRIMARY KEY, id TEXT, deleted INTEGER, growing INTEGER, time_ns INTEGER, duration_s REAL, level TEXT,
-  athlete TEXT, bib TEXT, bib_number INTEGER, favourite INTEGER, tags TEXT, continues TEXT, hill TEXT, text TEXT,
-  session TEXT, said TEXT, checksum INTEGER);
+  athlete TEXT, bib TEXT, bib_number INTEGER, favourite INTEGER, tags TEXT, continues TEXT, part INTEGER, hill TEXT,
+  text TEXT, session TEXT, said TEXT, checksum INTEGER);
 CREATE INDEX recordings_time ON recordings (deleted, time_ns, id);
 CREATE INDEX recordings_athlete ON recordings (athlete);
 CREATE INDEX recordings_continues ON recordings (continues) WHERE continues != '';

@@ -1,7 +1,8 @@
 """What the catalogue knows of one recording, read from its log."""
 
 import os
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
@@ -13,7 +14,7 @@ from recorder.reading.info import LogInfo, info
 from recorder.reading.log_reader import ForeignFileError
 from recorder.reading.records import link_text
 from rig.api.fields import LONGEST_TAG
-from rig.clocks import UtcNs
+from rig.clocks import NS_PER_S, UtcNs
 from rig.errors import BadInputError
 from rig.frame import FrameStatus
 from rig.host.file_names import is_recording_id
@@ -69,6 +70,8 @@ class Entry:
         disk: frames that were lost because of the disk; empty text: none.
         forgotten_s: after so many seconds it ended by itself, because nobody had stopped it; 0: otherwise.
         ended_early: why it ends before the recording was to end, or that this is not known; empty text: as was wanted.
+        next_part: id of the part in which it goes on; empty: in none.
+        parts: ids of its parts, itself the first; one alone if it is not split.
         trouble: what could not be read, and what to do, in one line; empty if all could be read.
         kind: of the trouble.
     """
@@ -93,6 +96,8 @@ class Entry:
     disk: Phrase = NOTHING
     forgotten_s: float = 0.0
     ended_early: Phrase = NOTHING
+    next_part: str = ""
+    parts: tuple[str, ...] = ()
     trouble: str = ""
     kind: Trouble = Trouble.NONE
 
@@ -147,7 +152,44 @@ def read_entry(path: Path) -> Entry:
         causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
         cameras=found.cameras, shape=found.shape, session=found.session, rig=found.rig.get("name", ""),
         disk=found.disk, forgotten_s=found.forgotten_s, ended_early=found.ended_early_said,
+        next_part=found.next_part, parts=(path.stem,),
     )  # fmt: skip
+
+
+_GRAVEST: Final = (LogState.DAMAGED, LogState.WRITING, LogState.UNFINISHED, LogState.CLOSED)
+
+
+def joined(parts: Sequence[Entry]) -> Entry:
+    """A recording that is split into these parts, as one entry with the id and the session of the first one."""
+    first, last = parts[0], parts[-1]
+    if len(parts) == 1:
+        return first
+    began = [part.started for part in parts if part.started is not None]
+    ends = [part.started + round(part.duration_s * NS_PER_S) for part in parts if part.started is not None]
+    failures: dict[str, Counter[FrameStatus]] = {}
+    for part in parts:
+        for camera, causes in part.failures.items():
+            failures.setdefault(camera, Counter()).update(causes)
+    return replace(
+        first,
+        bytes=sum(part.bytes for part in parts),
+        state=min((part.state for part in parts), key=_GRAVEST.index),
+        started=min(began, default=None),
+        duration_s=(max(ends) - min(began)) / NS_PER_S if began else 0.0,
+        pulses=sum(part.pulses for part in parts),
+        complete=sum(part.complete for part in parts),
+        missing=sum(part.missing for part in parts),
+        causes=dict(sum((Counter(part.causes) for part in parts), Counter())),
+        failures=failures,
+        pauses=tuple(pause for part in parts for pause in part.pauses),
+        disk=next((part.disk for part in parts if part.disk.text), NOTHING),
+        forgotten_s=last.forgotten_s,
+        ended_early=last.ended_early,
+        next_part=last.next_part,
+        parts=tuple(part.id for part in parts),
+        trouble=next((part.trouble for part in parts if part.trouble), ""),
+        kind=next((part.kind for part in parts if part.trouble), Trouble.NONE),
+    )
 
 
 def _in_words(path: Path, error: Exception) -> str:

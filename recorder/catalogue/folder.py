@@ -33,7 +33,7 @@ from recorder.catalogue.trash import (
 from recorder.catalogue.voice_notes import StoredVoice, add_voice_note, check_voice, voice_notes
 from recorder.log.session_changes import session_changes, write_session_changes
 from recorder.log.write_lock import is_being_written
-from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
 from rig.api.athletes import JumpQuery
@@ -176,7 +176,7 @@ class Catalogue:
             LogDamagedError: the image is damaged.
         """
         path = self._path(recording)
-        with LogReader(path, skim=True, links=False) as reader:
+        with RecordingReader(path, skim=True, links=False) as reader:
             place = self._places.of(reader, pulse).get(PulseNumber(pulse))
             if place is None:
                 raise UnknownRecordingError(
@@ -388,7 +388,7 @@ class Catalogue:
     def _entry(self, path: Path) -> Entry | None:
         """The entry of a file, None if the file has just been removed."""
         try:
-            return self._logs.entry(path)
+            return self._logs.whole(path)
         except FileNotFoundError:
             return None
 

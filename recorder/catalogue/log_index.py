@@ -14,16 +14,17 @@ from pathlib import Path
 from typing import Any, Final, Protocol, TypeVar
 
 from recorder.catalogue import database, search
-from recorder.catalogue.entry import SUFFIX, Entry, LogState, read_entry, with_changes
+from recorder.catalogue.entry import SUFFIX, Entry, LogState, joined, read_entry, with_changes
 from recorder.catalogue.file_key import FileKey, file_key, key_of
 from recorder.catalogue.folder_watch import FolderWatch
 from recorder.catalogue.trash import trash_of
-from recorder.log.extent import CONTINUES, CONTINUES_AFTER
+from recorder.log.extent import CONTINUES, CONTINUES_AFTER, PART, part_number
 from recorder.log.jumper_path import jumper_path
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import session_path
 from recorder.log.write_lock import is_being_written
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import parts_of
 from rig.api.athletes import JumpQuery, folded
 from rig.api.jump import LastJump
 from rig.api.recordings import RecordingQuery
@@ -40,7 +41,7 @@ _TOGETHER: Final = 100
 _INT64_MAX: Final = (1 << 63) - 1
 _LONGEST_SEARCHED: Final = 20_000
 #: Session fields that no person has written.
-_UNSEARCHED: Final = frozenset({"session", "recording", CONTINUES, CONTINUES_AFTER, "favourite"})
+_UNSEARCHED: Final = frozenset({"session", "recording", CONTINUES, CONTINUES_AFTER, PART, "favourite"})
 
 #: Session fields that a list of jumps shows.
 _SHOWN: Final = ("athlete", "bib", "gate")
@@ -138,8 +139,7 @@ class LogIndex:
         def answer(connection: sqlite3.Connection) -> tuple[int, list[Entry]]:
             self._look_around(connection, deleted=query.deleted)
             total, paths = search.found_paths(connection, query)
-            asked = "SELECT entry FROM logs WHERE path = ?"
-            return total, [_ENTRIES.decode(connection.execute(asked, (path,)).fetchone()[0]) for path in paths]
+            return total, [self._whole(connection, path) for path in paths]
 
         return self._answer(answer)
 
@@ -158,7 +158,7 @@ class LogIndex:
         return self._answer(answer)
 
     def following(self, ids: Sequence[str], *, deleted: bool) -> Mapping[str, str]:
-        """Which recordings go on with which of these: ids by ids.
+        """Which recordings go on with which of these: ids by ids; parts of the same recording do not count.
 
         Raises:
             OSError: the folder cannot be read.
@@ -166,10 +166,32 @@ class LogIndex:
 
         def answer(connection: sqlite3.Connection) -> Mapping[str, str]:
             self._look_around(connection, deleted=deleted)
-            asked = "SELECT continues, id FROM recordings WHERE continues = ? AND continues != '' AND deleted = ?"
+            linked = "continues = ? AND continues != '' AND deleted = ? AND part = 1"
+            asked = f"SELECT continues, id FROM recordings WHERE {linked}"  # noqa: S608
             return dict(row for each in ids for row in connection.execute(asked, (each, int(deleted))))
 
         return self._answer(answer)
+
+    def whole(self, path: Path) -> Entry:
+        """The entry of a recording by the path of its first part: with those parts that lie beside it.
+
+        Raises:
+            FileNotFoundError: the file is no longer there.
+        """
+        parts = parts_of(path)
+        return joined([self.entry(part) for part in parts[parts.index(path) :]])
+
+    def _whole(self, connection: sqlite3.Connection, path: str) -> Entry:
+        """The same, by what is known of the folder."""
+        asked = "SELECT entry FROM logs WHERE path = ?"
+        following = "SELECT path FROM recordings WHERE continues = ? AND continues != '' AND part > 1 AND deleted = ?"
+        parts: list[Entry] = [_ENTRIES.decode(connection.execute(asked, (path,)).fetchone()[0])]
+        while row := connection.execute(following, (parts[-1].id, int(parts[0].deleted))).fetchone():
+            part: Entry = _ENTRIES.decode(connection.execute(asked, row).fetchone()[0])
+            if any(part.id == each.id for each in parts):  # of a stranger
+                break
+            parts.append(part)
+        return joined(parts)
 
     def _folders(self) -> dict[bool, Path]:
         return {False: self._directory, True: trash_of(self._directory)}
@@ -342,6 +364,7 @@ class LogIndex:
                 float(entry.duration_s), self._judge.level(entry).value, folded(session.get("athlete", "")), bib,
                 int(bib) if bib.isascii() and bib.isdecimal() and len(bib) < 19 else None, int(entry.favourite),
                 "\n".join(("", *(folded(tag) for tag in entry.tags), "")), session.get(CONTINUES, ""),
+                part_number(session),
                 folded(session.get("hill", "") or escaped(entry.rig)), folded(said[:_LONGEST_SEARCHED]),
                 wire.encode({folded(field): folded(text) for field, text in session.items()}).decode(),
                 wire.encode({field: session.get(field, "") for field in _SHOWN}).decode(),

@@ -13,6 +13,11 @@ from rig.api.recordings import RecordingQuery, Sorting
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND: Final = timedelta(microseconds=1)
 _NEWEST: Final = "time_ns DESC, id DESC"
+#: The log before a part of a split recording, which is listed with the first one.
+_PART_BEFORE: Final = (
+    "SELECT 1 FROM recordings b WHERE b.path = substr(r.path, 1, length(r.path) - length(r.id || '.mcap')) "
+    "|| r.continues || '.mcap'"
+)
 _ORDERS: Final = {
     Sorting.NEWEST: _NEWEST,
     Sorting.OLDEST: "time_ns, id",
@@ -86,6 +91,7 @@ def found_jumps(connection: sqlite3.Connection, query: JumpQuery, columns: str) 
 def _of_recordings(query: RecordingQuery) -> Conditions:
     conditions, wanted = Conditions(), understood(query.search)
     conditions.add("deleted = ?", int(query.deleted))
+    conditions.add(f"(part = 1 OR NOT EXISTS ({_PART_BEFORE}))")
     _add_wanted(conditions, wanted)
     if wanted.figures:
         figures = " AND ".join(f"j.{column} {sign} ?" for column, sign, _ in wanted.figures)

@@ -9,7 +9,7 @@ from typing import Any
 from recorder.checking.pulse_check import PulseCheck
 from recorder.checking.structure_check import StructureCheck
 from recorder.checking.time_line import TimeLine
-from recorder.log.extent import apply_extent, ended_early, part_before
+from recorder.log.extent import apply_extent, ended_early, part_after, part_before
 from recorder.log.write_lock import is_being_written
 from recorder.reading.info import known_lost
 from recorder.reading.items import Chunk, Item, printable
@@ -80,6 +80,7 @@ class VerifyReport:
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         ended_early: why the log ends before its recording was to end, or that this is not known; empty: as was wanted.
         part_before: id of the log that this one continues and that does not lie beside it; empty: none is missed.
+        part_after: id of the part in which this one goes on and that does not lie beside it; empty: none is missed.
         being_written: a program is writing the log.
         off_time: messages far outside of the pulses, one sentence each; nothing is wrong with the pulses.
         unclosed: the finding that the log is not closed; empty: it is.
@@ -97,6 +98,7 @@ class VerifyReport:
     known_lost: tuple[tuple[int, int], ...] = ()
     ended_early: str = ""
     part_before: str = ""
+    part_after: str = ""
     being_written: bool = False
     off_time: tuple[str, ...] = ()
     unclosed: str = ""
@@ -112,7 +114,7 @@ class VerifyReport:
             return Verdict.DAMAGED
         if self.recounted.misfiled:
             return Verdict.CONTRADICTED
-        whole = self.ledger.whole and not (self.part_before or self.ended_early)
+        whole = self.ledger.whole and not (self.part_before or self.part_after or self.ended_early)
         return Verdict.CLEAN if whole else Verdict.PARTIAL
 
     @property
@@ -124,6 +126,8 @@ class VerifyReport:
         """What of the recording is not in this log, as far as the log says, one sentence each."""
         if self.part_before:
             yield f"goes on from {self.part_before}, which does not lie beside it: its pulses are not in this log"
+        if self.part_after:
+            yield f"goes on in {self.part_after}, which does not lie beside it: its pulses are not in this log"
         if self.ended_early:
             yield f"ended early: {self.ended_early}"
 
@@ -143,6 +147,7 @@ class VerifyReport:
             "pauses": [wire.to_builtins(pause) for pause in self.ledger.pauses()],
             "ended_early": self.ended_early,
             "part_before": self.part_before,
+            "part_after": self.part_after,
             "off_time": list(self.off_time),
             "misfiled": [difference.to_json() for difference in self.recounted.misfiled],
             "findings": list(self.findings),
@@ -183,7 +188,7 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
             pulses.recount.finish(merged=MERGE_METADATA in reader.metadata),
             findings.lines(), tuple(pulses.events), structure.data_checksum and structure.summary_checksum,
             known_lost(reader), ended_early(reader.metadata), part_before(reader.metadata, path),
-            being_written, tuple(times.in_words()), unclosed,
+            part_after(reader.metadata, path), being_written, tuple(times.in_words()), unclosed,
         )  # fmt: skip
 
 

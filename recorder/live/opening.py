@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,6 +34,18 @@ def in_background(make: Callable[[], LogWriter]) -> "Future[LogWriter]":
 
     threading.Thread(target=run, name="opens a log", daemon=True).start()
     return future
+
+
+def discard_in_background(error: StorageError, opening: "Future[LogWriter]") -> threading.Thread:
+    """Give up a log that nobody needs, whether it is open by now or not, and remove its file."""
+
+    def run() -> None:
+        wait([opening])
+        discard(error, opening)
+
+    thread = threading.Thread(target=run, name="removes a log", daemon=True)
+    thread.start()
+    return thread
 
 
 def discard(error: StorageError, opening: "Future[LogWriter]") -> None:

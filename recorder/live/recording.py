@@ -1,5 +1,6 @@
 """One recording: which pulses belong to it, their numbers and tags, and its log. Nothing here waits for the disk."""
 
+import threading
 from collections import deque
 from dataclasses import dataclass
 from functools import partial
@@ -9,7 +10,7 @@ from typing import Final
 import msgspec
 
 from recorder.live.assembler import Assembler
-from recorder.live.opening import discard, in_background, open_log
+from recorder.live.opening import discard, discard_in_background, in_background, open_log
 from recorder.live.preroll import Held
 from recorder.log.extent import (
     CONTINUES,
@@ -18,6 +19,8 @@ from recorder.log.extent import (
     ENDED_EARLY,
     ENDED_EARLY_SAID,
     FORGOTTEN,
+    NEXT_PART,
+    PART,
     as_field,
     extent,
 )
@@ -30,7 +33,7 @@ from rig.health import WritingHealth
 from rig.phrase import Phrase, phrase
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
-from rig.topics import RECORDING_METADATA, TROUBLE_METADATA
+from rig.topics import RECORDING_METADATA, SESSION_METADATA, TROUBLE_METADATA
 from rig.transport.recorder_commands import GoesOn, StartRecording, TellResult
 from rig.transport.recorder_reports import LogPart
 from triggering.ledger.account import Ledger
@@ -56,7 +59,8 @@ class Recording:
     Args:
         order: what to record.
         assembler: makes the triplets.
-        after: a recording whose log failed, and which this one continues.
+        after: a recording whose log failed, or is as large as a part may be, and which this one continues.
+        part: which part of a split recording the log is; from the second one on, `after` takes pulses until `follow`.
 
     Raises:
         BadInputError: the names of session and recording are too long for the log.
@@ -71,31 +75,41 @@ class Recording:
         trouble: what went wrong with the disk without ending the log; None: nothing.
         continues: id of the recording that this one continues, empty if none.
         mishap: whether it was stopped as soon as it had begun: its pulses belong to the next recording too.
+        next_part: id of the log in which it goes on when this one is as large as a part may be; empty: in none.
     """
 
-    def __init__(self, order: StartRecording, assembler: Assembler, after: "Recording | None" = None) -> None:
+    def __init__(
+        self, order: StartRecording, assembler: Assembler, after: "Recording | None" = None, part: int = 1
+    ) -> None:
         rig, session_name = assembler.rig, order.session.get("session", "")
         check_tag_fits(assembler.buffers.layout, [camera.name for camera in rig.cameras], session_name, order.recording)
         self._order, self._assembler = order, assembler
-        self._anchor = UtcAnchor.take()
+        self._anchor: UtcAnchor = UtcAnchor.take() if after is None or part == 1 else after._anchor
         self.failure: StorageError | None = None
         self.early: Phrase | None = None
         self.trouble: Phrase | None = None
-        self.continues = ""
+        self.continues = self.next_part = ""
         self.ledger = Ledger()
         self._handed = 0
         self._in_flight: deque[_InFlight] = deque()
         self._kept: deque[Held] = deque()
         self._ended = self._stopped = self.mishap = False
         self._last_before = self._first = PulseNumber(0)
-        self._begin(order) if after is None else self._go_on(after)
-        self.ledger.follows(self._last_before)
+        self._begun: HostNs | None = None
         self._account_until: HostNs | None = None
-        self._tell_ledger()
+        if after is None:
+            self._begin(order)
+            self._follow(self._last_before)
+        else:
+            self.follow(after)
         cameras = ", ".join(camera.name for camera in rig.cameras)
-        chain = {CONTINUES: self.continues, CONTINUES_AFTER: str(self._last_before)} if self.continues else {}
+        self._session = {"recording": order.recording, **order.session}
+        if self.continues:
+            self._session |= {CONTINUES: self.continues}
+            # the log before a part takes pulses while this one is made
+            self._session |= self._after if part == 1 else {PART: str(part)}
         description = LogDescription(
-            session={"recording": order.recording, **order.session, **chain},
+            session=self._session,
             rig={"name": rig.name, "cameras": cameras, "rate_hz": str(rig.trigger.rate_hz)},
             rig_toml=order.rig_toml.encode(),
             calibration_json=None if order.calibration is None else order.calibration.json,
@@ -124,13 +138,24 @@ class Recording:
             self._account_from = self._anchor.host(recording.time)
             self.begin = HostNs(self._account_from + round(recording.period_ns / 2))
 
-    def _go_on(self, after: "Recording") -> None:
-        """Go on after the last pulse that is in a log which failed."""
-        self.continues, self._last_before = after.id, after.ledger.last_pulse or after._last_before
+    def follow(self, after: "Recording") -> None:
+        """Go on after the last pulse that is in another log."""
+        self.continues = after.path.stem
         self.commanded, self.begin, self._end = after.commanded, after.begin, after._end
         self._since_command = after._since_command
         last = after.ledger.last_time
         self._account_from = after._account_from if last is None else after._anchor.host(last)
+        self._follow(after.ledger.last_pulse or after._last_before)
+
+    def _follow(self, last_before: PulseNumber) -> None:
+        self._last_before = last_before
+        self.ledger.follows(last_before)
+        self._tell_ledger()
+
+    @property
+    def _after(self) -> dict[str, str]:
+        """The session field that says after which pulse it goes on."""
+        return {CONTINUES_AFTER: str(self._last_before)}
 
     def _first_number(self, time: HostNs) -> PulseNumber:
         """Number of the log's first pulse: those that fired while there was no recorder are counted by time."""
@@ -178,6 +203,19 @@ class Recording:
         else:
             self.log.give_up(error)
 
+    def discard(self) -> threading.Thread:
+        """Remove the log again, which has no pulse; the thread that is returned ends when that is done."""
+        return discard_in_background(StorageError(f"{self.path}: no pulse came for this part"), self._opening)
+
+    def lasts_s(self, time: HostNs) -> float:
+        """From the first pulse that was handed to the log until a time, s; 0 without one."""
+        return 0.0 if self._begun is None else (time - self._begun) / NS_PER_S
+
+    @property
+    def size(self) -> int:
+        """Bytes of the log with everything that was handed to it, as far as is known; its end is not in it."""
+        return self._writer.size + len(self._in_flight) * self._assembler.buffers.layout.slot_bytes
+
     def finished(self) -> bool:
         """Whether no further pulse belongs to the recording, provided that all decided pulses were offered."""
         settled = self._assembler.settled
@@ -212,7 +250,7 @@ class Recording:
         cameras = self._assembler.camera_tags(pulse, self._anchor)
         session = self._order.session.get("session", "")
         if not self._handed:
-            self._first = self._first_number(pulse.time)
+            self._first, self._begun = self._first_number(pulse.time), pulse.time
         number, time = PulseNumber(self._first + self._handed), self._anchor.utc(pulse.time)
         rig = self._assembler.rig
         return TripletTag.made(number, time, session, self.id, rig.triplet_shape, cameras, rig.pixels)
@@ -266,6 +304,11 @@ class Recording:
         kept = list(self._kept)
         self._kept.clear()
         return kept
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing happens to the log any more, and all pulses in it are accounted for."""
+        return (self.log is None or self.log.over) and self.all_written and not self._kept
 
     @property
     def all_written(self) -> bool:
@@ -337,7 +380,7 @@ class Recording:
     def end_account(self) -> None:
         """Fix the moment until which the log tells of every pulse; time without pulses before it is a pause."""
         last = self.ledger.last_time
-        if (self._counted or self.failure is not None) and last is not None:
+        if (self._counted or self.failure is not None or self.next_part) and last is not None:
             self._account_until = self._anchor.host(last)
         else:  # pulses of the last moments may be undecided
             decided = HostNs(self._assembler.settled - self._assembler.hold_ns)
@@ -360,16 +403,20 @@ class Recording:
                 fields |= {ENDED_EARLY: str(self.early), ENDED_EARLY_SAID: as_field(self.early)}
             elif self._order.nobody_stops and not self._stopped:
                 fields |= {FORGOTTEN: f"{self._order.seconds or 0:.3f}"}
+            if self.next_part:
+                fields |= {NEXT_PART: self.next_part}
             if self.trouble is not None:
                 fields |= {DISK_SAID: as_field(self.trouble)}
             self._writer.set_metadata(RECORDING_METADATA, fields)
         if self.trouble is not None:
             self._writer.set_metadata(TROUBLE_METADATA, {"disk": str(self.trouble)})
+        if self.continues:
+            self._writer.set_metadata(SESSION_METADATA, self._session | self._after)
         self._writer.begin_close()
 
-    def continuation(self, path: Path) -> StartRecording:
-        """The order for a recording that continues this one in another log."""
-        return msgspec.structs.replace(self._order, path=path, goes_on=None)
+    def continuation(self, path: Path, *, part: bool = False) -> StartRecording:
+        """The order for a recording that continues this one in another log, which is its next `part` or not."""
+        return msgspec.structs.replace(self._order, path=path, goes_on=None, part_of=self.id if part else "")
 
     def part(self) -> LogPart:
         """What became of the log."""

@@ -86,7 +86,7 @@ class Recordings:
         self._recording: Recording | None = None
         self._phase = _Phase.OPENING
         self._closing_until = HostNs(0)
-        self._parts = Parts(assembler.rig.recorder.fallback_directory)
+        self._parts = Parts(assembler)
         self._watch = DiskWatch(0.0, 0)
         self._next_look = HostNs(0)
         self._behind = False
@@ -118,7 +118,7 @@ class Recordings:
         """
         if self._recording is not None:
             raise BadInputError("a recording is running: stop it before starting another")
-        self._parts.earlier.clear()
+        self._parts.begin()
         self._begin(Recording(order, self._assembler))
 
     def stop(self, *, at_once: bool = False, keep: bool = False) -> None:
@@ -131,7 +131,7 @@ class Recordings:
         if self._recording is None:
             return
         self._recording.stop()
-        self._recording.mishap = keep and not self._parts.earlier
+        self._recording.mishap = keep and self._parts.is_first
         if at_once:
             self._give_up(self._recording, wording.stopped_at_once(self._recording.path), may_continue=False)
 
@@ -145,9 +145,9 @@ class Recordings:
     def work(self, now: HostNs) -> None:
         """Do what can be done without waiting, for some milliseconds at most."""
         recording = self._recording
-        for each in (*self._parts.earlier, *([] if recording is None else [recording])):
-            each.confirm(now)
+        self._parts.settle(now)
         if recording is not None:
+            recording.confirm(now)
             recording.forget(least_free=self._buffers.count - self._preroll.triplets)
             writing = self._phase in {_Phase.RUNNING, _Phase.FLUSHING}
             if writing and recording.log is not None and recording.log.error is not None:
@@ -255,7 +255,11 @@ class Recordings:
         said = wording.started(recording.id)
         if self._parts.earlier:
             before = self._parts.earlier[-1]
-            said = wording.goes_on(before.id, recording.id, before.failure)
+            said = (
+                wording.next_part(recording.id, recording.path)
+                if before.next_part
+                else wording.goes_on(before.path.stem, recording.path.stem, before.failure)
+            )
             self._report(RecordingContinued(path=recording.path, before=before.part()))
         else:
             if recording.continues:
@@ -268,6 +272,7 @@ class Recordings:
 
     def _close(self, recording: Recording, now: HostNs, patience_ns: int) -> None:
         recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
+        self._parts.drop_following()
         if self._recording is recording:
             self._phase, self._closing_until = _Phase.CLOSING, HostNs(now + patience_ns)
             recording.begin_close()
@@ -311,6 +316,7 @@ class Recordings:
         event = Event.now(Level.WARNING if taken else Level.FATAL, "recorder", error.said)
         self._publisher.event(recording.dated(event, host_now()))
         recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
+        self._parts.drop_following()
         if not whole:
             self._preroll.put_back(recording.take_back())
         path = self._parts.next_path(recording, error) if may_continue else None
@@ -394,9 +400,36 @@ class Recordings:
                 continue
             now = host_now()
             self._behind = until is not None and (now > until or self._writer.lags(recording, held, now))
-            if self._behind:
+            if self._behind or self._turns_over(recording, held):
                 return
             self._write(recording, self._preroll.take())
+
+    def _turns_over(self, recording: Recording, held: Held) -> bool:
+        """Whether a pulse belongs to the next part of the recording, and that begins as soon as it can.
+
+        Until its log is open the present one takes the pulses. Then they wait, for some milliseconds, until all of the
+        present log are in the file: whatever the disk does, each pulse is in one of the two.
+        """
+        time_ = held.triplet.pulse.time
+        following = self._parts.following(recording, time_)
+        if following is None:
+            return False
+        try:
+            if not following.opened():
+                return False
+        except SvevError as error:
+            self._parts.refuse(recording, time_, error)
+            event = Event.now(Level.WARNING, "disk", wording.no_next_part(following.path, error))
+            self.happened(event)
+            self._report(RecorderEvent(event=event))
+            return self._recording is not recording
+        if recording.all_written:
+            recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
+            self._parts.turn_over(recording, following)
+            self._begin(following)
+            self._opened(following)
+        self._behind = True
+        return True
 
     def _write(self, recording: Recording, held: Held) -> None:
         tag = recording.tag(held.triplet.pulse)

@@ -26,6 +26,18 @@ def goes_on(before: str, recording: str, failure: SvevError | None) -> Phrase:
     return phrase("event_goes_on", text, before=before, recording=recording, why=failure.said)
 
 
+def next_part(recording: str, path: Path) -> Phrase:
+    """A log is as large as a part may be, and the recording goes on in another one."""
+    text = "recording {recording} goes on in its next part {path}"
+    return phrase("event_next_part", text, recording=recording, path=str(path))
+
+
+def no_next_part(path: Path, why: SvevError) -> Phrase:
+    """The log of a next part cannot be made."""
+    text = "the next part {path} cannot be made: {why}; the recording goes on in the same log"
+    return phrase("event_no_next_part", text, path=str(path), why=why.said)
+
+
 def goes_on_in(path: Path, failure: SvevError) -> Phrase:
     """A log failed, and another one is being made."""
     return phrase("event_goes_on_in", "{why}; the recording goes on in {path}", why=failure.said, path=str(path))

@@ -30,6 +30,10 @@ END_UNKNOWN: Final = "end"
 #: Fields of the session: id of the log that this one continues, and the number of the last pulse in it.
 CONTINUES: Final = "continues"
 CONTINUES_AFTER: Final = "continues_after"
+#: Field of the session: which part of a split recording this log is; the first one has none.
+PART: Final = "part"
+#: Field of the record: id of the log in which a split recording goes on.
+NEXT_PART: Final = "next_part"
 
 
 def extent(begin: UtcNs, end: UtcNs) -> dict[str, str]:
@@ -49,7 +53,7 @@ def apply_extent(metadata: Mapping[str, Mapping[str, str]], ledger: Ledger) -> N
         metadata: fields of the metadata records by name.
         ledger: of the log.
     """
-    ledger.follows(last_before(metadata))
+    ledger.follows(last_before(metadata, ledger.first_pulse))
     ledger.lasted(*times_of(metadata), _period_ns(metadata.get(RIG_METADATA, {})))
 
 
@@ -108,14 +112,37 @@ def part_before(metadata: Mapping[str, Mapping[str, str]], log: Path) -> str:
         metadata: fields of the metadata records by name.
         log: path of this one.
     """
-    before = metadata.get(SESSION_METADATA, {}).get(CONTINUES, "")
-    return "" if not before or os.path.lexists(log.with_name(f"{Path(before).name}{log.suffix}")) else before
+    return _not_beside(log, metadata.get(SESSION_METADATA, {}).get(CONTINUES, ""))
 
 
-def last_before(metadata: Mapping[str, Mapping[str, str]]) -> PulseNumber:
-    """The last pulse in the log that this one continues; 0: it continues none, or there was no pulse in it."""
-    text = metadata.get(SESSION_METADATA, {}).get(CONTINUES_AFTER, "")
-    return PulseNumber(int(text) if re.fullmatch(r"\d{1,10}", text, re.ASCII) else 0)
+def part_after(metadata: Mapping[str, Mapping[str, str]], log: Path) -> str:
+    """Id of the log in which this one goes on, if it does not lie beside this one; empty otherwise.
+
+    Args:
+        metadata: fields of the metadata records by name.
+        log: path of this one.
+    """
+    return _not_beside(log, metadata.get(RECORDING_METADATA, {}).get(NEXT_PART, ""))
+
+
+def part_number(session: Mapping[str, str]) -> int:
+    """Which part of a split recording a log is by the fields of its session; 1: the first one, or there is only one."""
+    text = session.get(PART, "")
+    return int(text) if session.get(CONTINUES) and re.fullmatch(r"[1-9]\d{0,5}", text, re.ASCII) else 1
+
+
+def last_before(metadata: Mapping[str, Mapping[str, str]], first: PulseNumber) -> PulseNumber:
+    """The last pulse in the log that this one continues; 0: it continues none, or there was no pulse in it.
+
+    Args:
+        metadata: fields of the metadata records by name.
+        first: first pulse in this log. A part of a split recording that was not closed says nothing else.
+    """
+    session = metadata.get(SESSION_METADATA, {})
+    text = session.get(CONTINUES_AFTER, "")
+    if re.fullmatch(r"\d{1,10}", text, re.ASCII):
+        return PulseNumber(int(text))
+    return PulseNumber(max(0, first - 1) if part_number(session) > 1 else 0)
 
 
 _PHRASES: Final = wire.decoder(Phrase)
@@ -135,6 +162,11 @@ def _said(metadata: Mapping[str, Mapping[str, str]], field: str, text: str) -> P
     except (msgspec.MsgspecError, ValueError, RecursionError):  # of a stranger
         return plain(text)
     return said if said.text == text else plain(text)
+
+
+def _not_beside(log: Path, other: str) -> str:
+    """The id of another log, if that does not lie beside this one; empty otherwise."""
+    return "" if not other or os.path.lexists(log.with_name(f"{Path(other).name}{log.suffix}")) else other
 
 
 def _time(fields: Mapping[str, str], name: str) -> UtcNs | None:

@@ -13,6 +13,7 @@ from recorder.publishing.keys import Keys
 from recorder.publishing.publisher import Publisher, bind, live_topic
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.records import Damage
 from recorder.reading.triplets import event_of, images_of, is_json, pixels, tag_of, view_image
 from rig.clocks import NS_PER_S, UtcNs
@@ -112,7 +113,7 @@ def replay(
         BadInputError: no such log, address in use, no such pulses, or (`reliable`) no worker came.
     """
     stop = stop or threading.Event()
-    with LogReader(path) as reader:
+    with RecordingReader(path) as reader:
         sink = (
             _PushSink(options.address, options.keys)
             if options.reliable

@@ -5,11 +5,21 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from recorder.log.extent import apply_extent, disk_trouble, ended_early_said, forgotten_s, part_before
+from recorder.log.extent import (
+    NEXT_PART,
+    apply_extent,
+    disk_trouble,
+    ended_early_said,
+    forgotten_s,
+    part_after,
+    part_before,
+    part_number,
+)
 from recorder.log.session_changes import session_changes
 from recorder.log.write_lock import is_being_written
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from recorder.reading.records import Damage
 from recorder.reading.triplets import health_of, tag_of
 from rig.host.utc_clock import UtcState
@@ -20,6 +30,7 @@ from rig.topics import (
     HEALTH,
     IMPORT_METADATA,
     MERGE_METADATA,
+    RECORDING_METADATA,
     RECOVERY_METADATA,
     RIG_METADATA,
     SESSION_METADATA,
@@ -57,6 +68,9 @@ class LogInfo:
         ended_early_said: why the log ends before its recording was to end, or that this is not known; empty text: as
             was wanted.
         part_before: id of the log that this one continues and that does not lie beside it; empty: none is missed.
+        part: which part of a split recording the log is; 1 also if it is whole.
+        next_part: id of the part in which the recording goes on; empty: in none, or the log was not closed.
+        part_after: the same if that does not lie beside this log; empty: none is missed.
         messages: number of messages per topic.
         library: the program that wrote the log.
         source: what the source of the pulses told of them, beside the tags; None: it tells nothing, the log does not
@@ -82,6 +96,9 @@ class LogInfo:
     forgotten_s: float
     ended_early_said: Phrase
     part_before: str
+    part: int
+    next_part: str
+    part_after: str
     messages: dict[str, int]
     library: str
     source: SourceAccount | None = None
@@ -151,13 +168,17 @@ class LogInfo:
             "compacted": self.compacted,
             "trouble": self.trouble,
             "ended_early": self.ended_early,
+            "part": self.part,
             "part_before": self.part_before,
+            "part_after": self.part_after,
             "messages": self.messages,
             "library": self.library,
         }
 
 
-def info(path: Path, *, original: bool = False, source: bool = False, links: bool = True) -> LogInfo:
+def info(
+    path: Path, *, original: bool = False, source: bool = False, links: bool = True, whole: bool = False
+) -> LogInfo:
     """Read what a log says about itself, and count its pulses by their tags.
 
     The time this takes depends on the number of pulses, not on the size of the log. Nothing is checked: `verify` does
@@ -168,6 +189,7 @@ def info(path: Path, *, original: bool = False, source: bool = False, links: boo
         original: give the session as the log has it, without the changes in the file beside it.
         links: whether a link of this name is followed.
         source: compare the tags with what the source of the pulses told, too.
+        whole: of all parts of a split recording, of which `path` is one.
 
     Raises:
         BadInputError: no such file, no MCAP log, not one of ours, or the file of session changes is broken.
@@ -176,7 +198,7 @@ def info(path: Path, *, original: bool = False, source: bool = False, links: boo
     told = SourceRecount() if source else None
     messages: dict[str, int] = {}
     damaged = torn = 0
-    with LogReader(path, skim=True, links=links) as reader:
+    with (RecordingReader if whole else LogReader)(path, skim=True, links=links) as reader:
         for item in reader.items(only=(TAG.name, HEALTH.name) if source else (TAG.name,)):
             if isinstance(item, Damage):
                 damaged += item.length
@@ -194,14 +216,17 @@ def info(path: Path, *, original: bool = False, source: bool = False, links: boo
         apply_extent(reader.metadata, ledger)
         if MERGE_METADATA in reader.metadata:
             told = None  # the health records of two computers have two clocks
-        session = reader.metadata.get(SESSION_METADATA, {}) | ({} if original else session_changes(path))
-        being_written = not reader.closed and is_being_written(path)
+        session = reader.metadata.get(SESSION_METADATA, {}) | ({} if original else session_changes(reader.path))
+        last = reader.paths[-1] if isinstance(reader, RecordingReader) else path
+        being_written = not reader.closed and is_being_written(last)
         return LogInfo(
             path, reader.size, reader.closed, being_written, reader.truncated, damaged, torn, ledger, first, session,
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
             reader.metadata.get(IMPORT_METADATA, {}), reader.metadata.get(COMPACT_METADATA, {}),
             disk_trouble(reader.metadata), forgotten_s(reader.metadata), ended_early_said(reader.metadata),
-            part_before(reader.metadata, path), messages, reader.library,
+            part_before(reader.metadata, reader.path), part_number(session),
+            reader.metadata.get(RECORDING_METADATA, {}).get(NEXT_PART, ""), part_after(reader.metadata, last),
+            messages, reader.library,
             None if told is None else told.finish(),
         )  # fmt: skip
 

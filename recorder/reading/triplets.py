@@ -14,6 +14,7 @@ from recorder.log.mcap_layout import CHUNK_MAX, raw_image_prefix
 from recorder.log.protobuf import fields
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from rig.clocks import UtcNs
 from rig.events import Event
 from rig.health import Health
@@ -31,7 +32,7 @@ _DATA_KEY = RawImage.DATA_FIELD_NUMBER << 3 | 2
 
 
 def triplets(path: Path) -> Iterator[tuple[TripletTag, Stored]]:
-    """Every pulse of a log: its tag, and its image, (rows, columns), valid until the next one is taken.
+    """Every pulse of a recording: its tag, and its image, (rows, columns), valid until the next one is taken.
 
     The block of a camera that is not ok is black; the whole image of a pulse without any frame is black. Pulses in
     damaged parts of the log are left out.
@@ -40,7 +41,7 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, Stored]]:
         BadInputError: no such file, no MCAP log, or not one of ours.
         ValueError: a chunk is sound, but what it holds is no tag or no image.
     """
-    with LogReader(path) as reader:
+    with RecordingReader(path) as reader:
         for chunk in reader.sound_chunks():
             images = {pulse: image.data for pulse, image in images_of(chunk).items()}
             for message in chunk.messages:
@@ -51,16 +52,16 @@ def triplets(path: Path) -> Iterator[tuple[TripletTag, Stored]]:
 
 
 def tags(path: Path, *, links: bool = True) -> Iterator[TripletTag]:
-    """The tags of a log, in its order, without those in damaged parts; reads no pixels.
+    """The tags of a recording, in its order, without those in damaged parts; reads no pixels.
 
     Args:
-        path: the log.
+        path: the log, or any part of a split one.
         links: whether a link of this name is followed.
 
     Raises:
         BadInputError: the log cannot be read.
     """
-    with LogReader(path, skim=True, links=links) as reader:
+    with RecordingReader(path, skim=True, links=links) as reader:
         for chunk in reader.sound_chunks(only=(TAG.name,)):
             for message in chunk.messages:
                 if (tag := tag_of(message)) is not None:

@@ -29,6 +29,7 @@ from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.images.pixels import Stored
 from rig.phrase import Phrase, phrase, plain
+from rig.pulse import PulseNumber
 from rig.tag import CameraTag, TripletTag
 from rig.topics import (
     CALIBRATION_ATTACHMENT,
@@ -175,7 +176,8 @@ class _Recovery:
         self._next_other = next(self._others, None)
         self._written: set[tuple[str, int, int]] = set()
         self.ledger = Ledger()
-        self.ledger.follows(last_before(reader.metadata))
+        first = chain.pulses[0].pulse if chain.pulses else PulseNumber(0)
+        self.ledger.follows(last_before(reader.metadata, first))
         self.findings = scan.findings
         for text in chain.left_out:
             self.findings.add(text)

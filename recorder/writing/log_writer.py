@@ -225,6 +225,11 @@ class LogWriter:
         return self._thread.pulses
 
     @property
+    def size(self) -> int:
+        """Bytes that are in the file."""
+        return self._file.size
+
+    @property
     def free_bytes(self) -> int:
         """Room left on the disk about a second ago, in bytes."""
         return self._thread.free_bytes

@@ -157,6 +157,7 @@ class Recording(Model):
     )
     continues: str = Field("", description="id of the recording of which this is the next part; empty: of none")
     continued_by: str = Field("", description="id of the recording that is the next part of this one; empty: none here")
+    parts: tuple[str, ...] = Field((), description="ids of the logs that the recording is split into, in their order")
 
 
 class Sorting(StrEnum):

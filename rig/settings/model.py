@@ -58,6 +58,12 @@ class RecorderSettings(StrictModel):
         description="svev serve: a recording that was started without a length and that nobody stops ends after so "
         "many seconds",
     )
+    part_s: float | None = Field(
+        None, ge=1, description="a recording goes on in another log, its next part, after so many seconds"
+    )
+    part_gb: float | None = Field(
+        None, ge=0.001, description="the same before a log is larger than this, 10^9 bytes; both: whichever comes first"
+    )
     reserve_gb: float = Field(1.0, ge=0, description="recording stops, file intact, before less than this is free")
     per_camera_topics: bool = Field(
         False,
@@ -337,6 +343,11 @@ class RigSettings(StrictModel):
     def without_absent(self) -> "RigSettings":
         """The same rig, content with any camera that answers."""
         return self.model_copy(update={"trigger": self.trigger.model_copy(update={"min_cameras": 1})})
+
+    def split(self, part_s: float | None, part_gb: float | None) -> "RigSettings":
+        """The same rig with other limits for the parts of a recording; None: as they are."""
+        limits = {name: limit for name, limit in (("part_s", part_s), ("part_gb", part_gb)) if limit is not None}
+        return self.model_copy(update={"recorder": self.recorder.model_copy(update=limits)})
 
     @property
     def triplet_shape(self) -> tuple[int, int]:

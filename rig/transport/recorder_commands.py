@@ -82,7 +82,7 @@ class StartRecording(Message):
     """Command to the recorder: start a recording.
 
     Attributes:
-        path: log to create; its name without `.mcap` is the id of the recording.
+        path: log to create; the name of the first one without `.mcap` is the id of the recording.
         session: fields of the session (athlete, bib, gate, wind, notes, operator, session).
         pulses: stop after so many, counted from the command; None: until told.
         seconds: stop so long after the command even if fewer pulses came; None: until told.
@@ -93,6 +93,7 @@ class StartRecording(Message):
         rig_toml: the rig file as it was read, attached to the log.
         calibration: calibration of the cameras; None: not known.
         goes_on: the recording that this one continues after the death of its recorder; None: it is a new one.
+        part_of: id of the recording of which the log is a later part; empty: it is the first one.
     """
 
     path: Path
@@ -106,11 +107,12 @@ class StartRecording(Message):
     rig_toml: str = ""
     calibration: Calibration | None = None
     goes_on: GoesOn | None = None
+    part_of: str = ""
 
     @property
     def recording(self) -> str:
         """Id of the recording."""
-        return self.path.stem
+        return self.part_of or self.path.stem
 
 
 class StopRecording(Message):

@@ -147,11 +147,11 @@ class LogPart(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RecordingContinued(Message):
-    """The log failed, and the recording goes on in another one.
+    """The log failed, or was as large as a part may be, and the recording goes on in another one.
 
     Attributes:
         path: the new log.
-        before: the log that failed.
+        before: the log before it.
     """
 
     path: Path
@@ -165,7 +165,7 @@ class RecordingFinished(RecordingProgress):
         path: the log; the last one if the recording has several.
         bytes: its size.
         unpublished: triplets that the recorder has dropped so far because subscribers were too slow.
-        earlier: the logs before it, which failed.
+        earlier: the logs before it, which failed, or were as large as a part may be.
         failure: why the recording ended before its time; None if it did not.
         trouble: frames that were lost because of the disk, in words; empty if none.
     """

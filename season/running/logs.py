@@ -4,12 +4,14 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from pathlib import Path
 from typing import Final
 
+from recorder.reading.parts import parts_of
 from rig.errors import BadInputError
 from season.campaign import Campaign, Hill, Source
 from season.running.outcome import Orienting, Outcome, decoded, read_orienting
-from season.running.stores import Entry, listed, read_outcomes
+from season.running.stores import Entry, is_remote, listed, read_outcomes
 
 #: The recorder names a log by the time at which it was opened, UTC.
 _DAY: Final = re.compile(r"(\d{4}-\d{2}-\d{2})T")
@@ -52,7 +54,7 @@ def find_logs(campaign: Campaign) -> list[SeasonLog]:
     hills: dict[str, tuple[Entry, Hill]] = {}
     for hill in campaign.hills:
         for place in hill.logs:
-            for entry in listed(place, campaign.store):
+            for entry in filter(_is_first, listed(place, campaign.store)):
                 before = hills.setdefault(entry.url, (entry, hill))[1]
                 if before.name != hill.name:
                     raise BadInputError(
@@ -68,6 +70,11 @@ def find_logs(campaign: Campaign) -> list[SeasonLog]:
         SeasonLog(entry, hill.name, read[sources[url]], decoded(content))
         for (url, (entry, hill)), content in zip(hills.items(), outcomes, strict=True)
     ]
+
+
+def _is_first(entry: Entry) -> bool:
+    """Whether a log is no later part of a split recording, which is measured with the first one."""
+    return is_remote(entry.url) or parts_of(path := Path(entry.url))[0] == path
 
 
 def with_outcomes(logs: Sequence[SeasonLog], outcomes: Mapping[str, Outcome]) -> list[SeasonLog]:

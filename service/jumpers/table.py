@@ -34,7 +34,9 @@ _KNOWN: Final = {name: column for column, names in _NAMES.items() for name in na
 _NUMBERS: Final = frozenset({"bib", "gate"})
 _DATE: Final = re.compile(r"\d{4}-\d\d-\d\d")
 #: Names that a log's session record has for other things.
-_RESERVED: Final = frozenset({"session", "recording", "continues", "continues_after", "round", "wind", "operator"})
+_RESERVED: Final = frozenset(
+    {"session", "recording", "continues", "continues_after", "part", "round", "wind", "operator"}
+)
 
 
 #: A heading stands among so many first rows that hold something.

@@ -79,7 +79,8 @@ class Archive(ArchiveResults, ArchiveNotes):
         Raises:
             StateForbidsError: it does not lie in the trash.
         """
-        if not self._catalogue.entry(recording_id, prefer_deleted=True).deleted:
+        entry = self._catalogue.entry(recording_id, prefer_deleted=True)
+        if not entry.deleted:
             raise StateForbidsError(
                 phrase(
                     "recording_not_in_trash",
@@ -87,7 +88,9 @@ class Archive(ArchiveResults, ArchiveNotes):
                     recording=recording_id,
                 )
             )
-        return _as_trash(self._catalogue.remove(recording_id))
+        removed = [self._catalogue.remove(part) for part in entry.parts[:0:-1]]
+        removed.append(self._catalogue.remove(recording_id))
+        return Trash(recordings=len(removed), bytes=sum(each.bytes for each in removed))
 
     def download(self, recording_id: str) -> Download:
         """A recording that has ended, as a file with its corrected session.
@@ -112,7 +115,7 @@ class Archive(ArchiveResults, ArchiveNotes):
 
     def _check_ended(self, recording_id: str) -> None:
         current = self.status().recording
-        here = current is not None and current.id == recording_id
+        here = current is not None and recording_id in (current.id, *current.parts)
         if here or self._catalogue.entry(recording_id).state is LogState.WRITING:
             raise StillRecordingError(
                 phrase(
@@ -141,7 +144,10 @@ class Archive(ArchiveResults, ArchiveNotes):
     def zipped(self, recording_ids: Sequence[str]) -> tuple[int, Iterator[bytes]]:
         """Several recordings and what belongs to them as one archive: its size, and its bytes piece by piece."""
         downloads: list[Download] = []
-        for recording_id in dict.fromkeys(recording_ids):
+        for recording_id in recording_ids:
+            self._check_ended(recording_id)
+        entries = [self._catalogue.entry(recording_id) for recording_id in recording_ids]
+        for recording_id in dict.fromkeys(part for each in entries for part in each.parts or (each.id,)):
             file = self.download(recording_id)
             log = self._catalogue.file(recording_id)
             downloads += [file, *result_downloads(log, file.name), *digitized_downloads(log, file.name)]

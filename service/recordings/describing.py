@@ -41,6 +41,7 @@ def as_recording(entry: Entry) -> Recording:
         tags=entry.tags,
         more=more_of(entry.session),
         continues=entry.session.get(CONTINUES, "")[:LONGEST_SHOWN],
+        parts=entry.parts or (entry.id,),
     )
 
 
@@ -54,41 +55,60 @@ class Chain:
 
     def __init__(self, catalogue: Catalogue, entries: Sequence[Entry]) -> None:
         self._catalogue = catalogue
-        self._ids = {entry.id for entry in entries}
+        self._ids = {part for entry in entries for part in (entry.id, *entry.parts)}
+        self._next = {entry.id: entry.next_part for entry in entries if entry.next_part}
         deleted = any(entry.deleted for entry in entries)
-        self._following = catalogue.following([entry.id for entry in entries], deleted=deleted)
+        parts = {entry.id: entry.parts or (entry.id,) for entry in entries}
+        following = catalogue.following([part for each in parts.values() for part in each], deleted=deleted)
+        self._following = {
+            first: following[part] for first, each in parts.items() for part in each if part in following
+        }
 
     def pointing_on(self, recording: Recording) -> Recording:
-        """A recording with the id of its next part, if it has one; its verdict says if the part before is gone."""
+        """A recording with the id of the one that goes on with it; its verdict says if a part of it is gone."""
         update: dict[str, Any] = {}
         if (by := self._following.get(recording.id)) is not None:
             update["continued_by"] = by
-        if self._lacks_part_before(recording):
-            update["verdict"] = _without_part_before(recording)
+        if recording.continues and not self._is_here(recording.continues):
+            update["verdict"] = _without_part(
+                recording,
+                "verdict_part_gone",
+                recording.continues,
+                "Goes on from {}, which is not here: the beginning is missing",
+                "Look for the first part on the other disk, or in a copy",
+            )
+        elif (after := self._next.get(recording.id, "")) and not self._is_here(after):
+            update["verdict"] = _without_part(
+                recording,
+                "verdict_next_part_gone",
+                after,
+                "Goes on in {}, which is not here: the end is missing",
+                "Look for that part in the trash, or in a copy",
+            )
         return recording.model_copy(update=update) if update else recording
 
-    def _lacks_part_before(self, recording: Recording) -> bool:
-        """Whether the part before lies neither in the folder nor in its trash."""
-        if not recording.continues or recording.continues in self._ids:
-            return False
-        try:
-            self._catalogue.entry(recording.continues)
-        except UnknownRecordingError:
+    def _is_here(self, part: str) -> bool:
+        """Whether a part lies in the folder or in its trash."""
+        if part in self._ids:
             return True
-        return False
+        try:
+            self._catalogue.entry(part)
+        except UnknownRecordingError:
+            return False
+        return True
 
 
-def _without_part_before(recording: Recording) -> Statement:
-    """The verdict on a recording whose part before is gone, unless something graver is said of it."""
+def _without_part(recording: Recording, code: str, part: str, text: str, advice: str) -> Statement:
+    """The verdict on a recording of which a part is gone, unless something graver is said of it."""
     told = recording.verdict
     if told.level is Level.ERROR:
         return told
     return Statement(
         level=Level.WARNING,
-        code="verdict_part_gone",
-        text=f"Goes on from {recording.continues}, which is not here: the beginning is missing. {told.text}",
-        advice="Look for the first part on the other disk, or in a copy",
-        values={"before": recording.continues, "rest": told.said},
+        code=code,
+        text=f"{text.format(part)}. {told.text}",
+        advice=advice,
+        values={"before": part, "rest": told.said},
     )
 
 

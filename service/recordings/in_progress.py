@@ -14,7 +14,7 @@ from rig.api.statement import Level, Statement
 from rig.clocks import HostNs, UtcNs
 from rig.errors import SvevError
 from rig.transport.recorder_commands import StartRecording
-from rig.transport.recorder_reports import RecordingFinished, RecordingProgress, RecordingStarted
+from rig.transport.recorder_reports import LogPart, RecordingFinished, RecordingProgress, RecordingStarted
 from service.recordings.interruption import Interruption
 from service.recordings.listing import more_of, utc
 
@@ -32,6 +32,7 @@ class Account:
         pauses: stretches of time without a pulse.
         before: the counts of logs of recorders that died, by the ids of these logs.
         pauses_before: the pauses in them.
+        parts: the counts of parts that are complete, likewise; the recorder reports them as long as it lives.
     """
 
     started: datetime | None = None
@@ -39,6 +40,7 @@ class Account:
     pauses: int = 0
     before: Mapping[str, Counts] = field(default_factory=lambda: MappingProxyType({}))
     pauses_before: int = 0
+    parts: Mapping[str, Counts] = field(default_factory=lambda: MappingProxyType({}))
 
     def begun(self, first_pulse: UtcNs | None) -> "Account":
         """With the time of the first pulse, if it is new."""
@@ -54,7 +56,12 @@ class Account:
 
     def gone_on(self, log: str, counts: Counts) -> "Account":
         """After the recorder of a log died, which holds so many pulses."""
-        return replace(self, before=MappingProxyType({**self.before, log: counts}), pauses_before=self.pauses)
+        before = MappingProxyType({**self.before, **self.parts, log: counts})
+        return replace(self, before=before, pauses_before=self.pauses, parts=MappingProxyType({}))
+
+    def in_next_part(self, log: str, counts: Counts) -> "Account":
+        """After a part of the recording is complete, which holds so many pulses."""
+        return replace(self, parts=MappingProxyType({**self.parts, log: counts}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +83,8 @@ class RecordingInProgress:
         size: of the log that is being written, bytes.
         interruption: the death of its recorder, until it goes on; None: its recorder lives.
         deaths: when its recorders died, on the monotonic clock, s.
+        first: place of the log among `logs` that has its id: the later ones are its parts.
+        size_before: of those parts that are complete, bytes.
     """
 
     order: StartRecording
@@ -92,6 +101,8 @@ class RecordingInProgress:
     size: int = 0
     interruption: Interruption | None = None
     deaths: tuple[float, ...] = ()
+    first: int = 0
+    size_before: int = 0
 
     @property
     def path(self) -> Path:
@@ -101,7 +112,7 @@ class RecordingInProgress:
     @property
     def id(self) -> str:
         """Its id."""
-        return self.path.stem
+        return self.logs[self.first].stem
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -128,7 +139,13 @@ class RecordingInProgress:
 
     def continued_in(self, path: Path) -> "RecordingInProgress":
         """The log failed, and the recording goes on in another one."""
-        return replace(self, logs=(*self.logs, path))
+        return replace(self, logs=(*self.logs, path), first=len(self.logs), size_before=0)
+
+    def in_next_part(self, path: Path, before: LogPart) -> "RecordingInProgress":
+        """The log is as large as a part may be, and the recording goes on in another one."""
+        account = self.account.in_next_part(before.path.stem, before.counts)
+        size = self.size_before + before.bytes
+        return replace(self, logs=(*self.logs, path), account=account, size=0, size_before=size)
 
     def gone_on(self, order: StartRecording, before: Counts) -> "RecordingInProgress":
         """A new recorder has the order to go on.
@@ -167,10 +184,11 @@ class RecordingInProgress:
             state=RecordingState.RECORDING,
             started=started,
             duration_s=round((now - started).total_seconds(), 1),
-            bytes=self.size,
+            bytes=self.size_before + self.size,
             counts=counts,
             session=self.session,
             verdict=verdict,
             more=more_of(self.order.session),
-            continues=self.ids[-2] if len(self.ids) > 1 else "",
+            continues=self.ids[self.first - 1] if self.first else "",
+            parts=self.ids[self.first :],
         )

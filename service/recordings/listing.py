@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 from itertools import islice
 from typing import Final
 
-from recorder.log.extent import CONTINUES, CONTINUES_AFTER
+from recorder.log.extent import CONTINUES, CONTINUES_AFTER, PART
 from rig.api.fields import LONGEST_LINE
 from rig.api.recordings import SessionFields
 from rig.api.start_list import COLUMN_NAME_MAX, COLUMNS_MAX
@@ -15,7 +15,7 @@ from service.recordings.notes import NOTE_FIELD
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 #: Session fields of which the program itself makes something.
 _PROGRAMS: Final = frozenset(
-    {*SessionFields.model_fields, "recording", "session", "tags", "favourite", CONTINUES, CONTINUES_AFTER}
+    {*SessionFields.model_fields, "recording", "session", "tags", "favourite", CONTINUES, CONTINUES_AFTER, PART}
 )
 #: What the start list says of a jumper beside the own columns.
 _BESIDE_COLUMNS: Final = ("round", "club")

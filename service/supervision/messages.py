@@ -327,9 +327,10 @@ class MeasureLog(msgspec.Struct, frozen=True):
 
 
 class LogOpened(msgspec.Struct, frozen=True):
-    """The recorder has made a log."""
+    """The recorder has made a log; `part`: it is not the first one of its recording, but a later part."""
 
     log: Path
+    part: bool = False
 
 
 class LogsClosed(msgspec.Struct, frozen=True):

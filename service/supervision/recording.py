@@ -10,7 +10,7 @@ from rig.api.status import State
 from rig.clocks import NS_PER_S
 from rig.errors import NameTakenError, ProcessDiedError, StateForbidsError, SvevError, UnknownRecordingError
 from rig.events import Level
-from rig.phrase import NOTHING, phrase
+from rig.phrase import phrase
 from rig.transport.recorder_commands import Calibration, StartRecording, StopRecording
 from rig.transport.recorder_reports import (
     RecorderFailed,
@@ -218,10 +218,12 @@ def started(now: Situation, current: RecordingInProgress, report: RecordingStart
 
 
 def continued(now: Situation, current: RecordingInProgress, report: RecordingContinued, _: Moment, do: Do) -> Situation:
-    """The log failed, and the recorder goes on in another one."""
-    do(LogOpened(report.path))
-    why = report.before.failure or NOTHING
-    now = _with_notice(now, recording_continued(report.before.path.stem, report.path, why))
+    """The log failed, or is as large as a part may be, and the recorder goes on in another one."""
+    do(LogOpened(report.path, part=report.before.failure is None))
+    if report.before.failure is None:
+        return _with(now, current.in_next_part(report.path, report.before))
+    notice = recording_continued(report.before.path.stem, report.path, report.before.failure)
+    now = _with_notice(now, notice)
     return _with(now, current.continued_in(report.path))
 
 

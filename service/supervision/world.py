@@ -169,8 +169,9 @@ class World:
                 with suppress(FileNotFoundError):  # somebody has moved the log away
                     return LogGrown(effect.log.stat().st_size)
             case LogOpened():
-                self.truths.opened(effect.log, self.session.truth)
-                self._on_log(effect.log)
+                if not effect.part:  # truth and measurements are those of the whole recording
+                    self.truths.opened(effect.log, self.session.truth)
+                    self._on_log(effect.log)
             case LogsClosed():
                 self.truths.closed(effect.failed)
             case ReadLog():

@@ -15,8 +15,11 @@ import zmq
 from analysis.measurements.file import read_measurements
 from analysis.procedure.analyze import analyze
 from bench.analysis.hill_logs import HillLog
+from recorder.reading.log_reader import LogReader
+from recorder.reading.triplets import stored_triplets
 from tests.analysis.measured import FIRST_DAY, PULSES, measured_jump
 from tests.analysis.simulated import training
+from tests.recorder.split import split_log
 from tests.support.commands import run_svev
 from tests.support.kept import kept_hill_log
 from tests.support.loopback import Loopback
@@ -55,6 +58,16 @@ def test_a_jump_is_measured_and_its_errors_are_within_their_sigmas(
     assert all((out / name).stat().st_size > 100 for name in names)
     _the_same_from_the_measurements(jump, out, tmp_path / "again")
     _the_example_of_the_documentation_runs(jump, out, tmp_path / "documented", monkeypatch, capsys)
+
+
+@pytest.mark.long
+def test_a_jump_in_two_parts_is_one_jump(jump: HillLog, tmp_path: Path) -> None:
+    with LogReader(jump.path) as reader:
+        pulses = len(stored_triplets(reader))
+    _, second = split_log(jump.path, tmp_path / "r1.mcap", (pulses // 2,))
+    svev("analyze", second, "--survey", jump.survey, "--out", tmp_path / "out")
+    whole, split = (json.loads((out / "jumper.json").read_text()) for out in (measured_jump().result, tmp_path / "out"))
+    assert [each["pulses"] for each in split["jumps"]] == [each["pulses"] for each in whole["jumps"]]
 
 
 def _points_are_true(measured: dict[str, Any], truth: dict[int, dict[str, Any]]) -> None:

@@ -37,7 +37,7 @@ def test_all_cases_of_the_paper_s_load_are_measured(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=150)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)["paper"]
-    for case in ("svev", "svev, one subscriber"):
+    for case in ("svev", "svev, one subscriber", "svev, split, one subscriber"):
         assert result[case]["pulses"] == 30
         assert result[case]["cpu_s"] > 0
     assert result["svev, one subscriber"]["received"] > 0

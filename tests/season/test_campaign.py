@@ -8,6 +8,8 @@ import pytest
 from rig.errors import BadInputError
 from season.campaign import read_campaign
 from season.running.logs import day_of, find_logs, with_outcomes
+from tests.recorder.logs import write_log
+from tests.recorder.split import split_log
 from tests.season.drawn import draw_season
 from tests.season.files import SURVEY, campaign_file, log_file
 
@@ -38,6 +40,14 @@ def test_logs_are_found_in_folders_and_by_patterns_each_once(tmp_path: Path) -> 
     deep, flat = log_file(tmp_path / "hill" / "day" / "b.mcap"), log_file(tmp_path / "hill" / "a.mcap")
     campaign = read_campaign(campaign_file(tmp_path, logs=["hill", "hill/*.mcap", "hill/a.mcap"]))
     assert [log.url for log in find_logs(campaign)] == [str(flat), str(deep)]
+
+
+def test_a_split_recording_is_measured_once(tmp_path: Path) -> None:
+    write_log(tmp_path / "whole.mcap")
+    (tmp_path / "hill").mkdir()
+    first, *_ = split_log(tmp_path / "whole.mcap", tmp_path / "hill" / "r1.mcap", (1, 2))
+    campaign = read_campaign(campaign_file(tmp_path, logs=["hill"]))
+    assert [log.url for log in find_logs(campaign)] == [str(first)]
 
 
 def test_a_place_without_logs_is_named(tmp_path: Path) -> None:

@@ -71,6 +71,7 @@ class Ledger:
         incomplete: runs of pulses with missing frames, the first ten thousand.
         missing: runs of pulses without a tag, as (first, last).
         out_of_order: pulses whose tag comes twice or too late.
+        first_pulse: number of the first tag.
         last_pulse: highest pulse number so far.
         first_time, last_time: times of the first and the last pulse, UTC.
         spread: |offset_us| of all frames.
@@ -83,10 +84,10 @@ class Ledger:
     incomplete: list[IncompleteRun] = field(default_factory=list)
     missing: list[tuple[int, int]] = field(default_factory=list)
     out_of_order: list[PulseNumber] = field(default_factory=list)
+    first_pulse: PulseNumber = _NONE
     last_pulse: PulseNumber = _NONE
     first_time: UtcNs | None = None
     spread: Spread = field(default_factory=Spread)
-    _first_pulse: PulseNumber = _NONE
     _last: TripletTag | None = None
     _pauses: PauseFinder = field(default_factory=PauseFinder)
     _begin: UtcNs | None = None
@@ -100,7 +101,7 @@ class Ledger:
         The pulses between it and the first one of this log have no tag anywhere: they are a pause, not missing here.
         """
         self._follows = last
-        if last and self.missing[:1] == [(1, self._first_pulse - 1)]:
+        if last and self.missing[:1] == [(1, self.first_pulse - 1)]:
             del self.missing[0]
 
     def add(self, tag: TripletTag) -> None:
@@ -111,7 +112,7 @@ class Ledger:
         if tag.pulse > self.last_pulse + 1 and not (self._last is None and self._follows):
             self.missing.append((self.last_pulse + 1, tag.pulse - 1))
         if self._last is None:
-            self.first_time, self._first_pulse = tag.time, tag.pulse
+            self.first_time, self.first_pulse = tag.time, tag.pulse
         elif tag.time > self._last.time:
             self._pauses.add(self._last, tag)
         self.last_pulse, self._last = tag.pulse, tag
@@ -171,7 +172,7 @@ class Ledger:
     @property
     def rate_hz(self) -> float | None:
         """Pulses per second, None if there are fewer than two."""
-        return (self.last_pulse - self._first_pulse) / self.duration_s if self.duration_s > 0 else None
+        return (self.last_pulse - self.first_pulse) / self.duration_s if self.duration_s > 0 else None
 
     def pauses(self) -> tuple[Pause, ...]:
         """The stretches of time without a pulse, in order; of very many only the first thousand and the last ones.
@@ -181,20 +182,20 @@ class Ledger:
         finder = self._pauses
         if self._last is None:
             return tuple(self._margin(self._begin, self._end, None, finder.last_period()))
-        at_begin = self.first_time if self._first_pulse == self._follows + 1 else None
+        at_begin = self.first_time if self.first_pulse == self._follows + 1 else None
         return (
             *self._between_logs(),
-            *self._margin(self._begin, at_begin, self._first_pulse, finder.first_period()),
+            *self._margin(self._begin, at_begin, self.first_pulse, finder.first_period()),
             *finder.pauses(),
             *self._margin(self._last.time, self._end, None, finder.last_period()),
         )
 
     def _between_logs(self) -> Iterator[Pause]:
         """The pulses that neither the log before this one has nor this one."""
-        pulses = self._first_pulse - self._follows - 1
+        pulses = self.first_pulse - self._follows - 1
         if self._follows and pulses > 0 and self._begin is not None and self.first_time is not None:
             seconds = round((self.first_time - self._begin) / NS_PER_S, 6)
-            yield Pause(self._follows, self._first_pulse, seconds, pulses)
+            yield Pause(self._follows, self.first_pulse, seconds, pulses)
 
     def _margin(
         self, begin: UtcNs | None, end: UtcNs | None, before: PulseNumber | None, period: float | None

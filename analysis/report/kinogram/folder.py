@@ -12,7 +12,7 @@ from analysis.report.kinogram.page import page_text
 from analysis.report.kinogram.picture import jpeg_of
 from analysis.result.model import MeasuredRecording, Quantity
 from analysis.scene.camera_system import CameraSystem
-from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import RecordingReader
 from rig.topics import RIG_METADATA
 
 
@@ -80,7 +80,7 @@ def write_kinograms(
 
 def _hill(log: Path) -> str:
     """Name of the rig that recorded the log, which is that of the hill; empty if it has none."""
-    with LogReader(log, skim=True) as reader:
+    with RecordingReader(log, skim=True) as reader:
         for _ in reader.items():
             if RIG_METADATA in reader.metadata:
                 break

@@ -41,8 +41,8 @@ def info_command(log: LogPath, as_json: AsJson = False) -> None:
     even for a long log; `svev verify` checks every byte.
 
     Exit codes: 0; 2 no such file, no log of svev, or truncated; 3 the log was not closed, is still being written, is
-    damaged, or is not its whole recording (it ended early, or goes on from one that does not lie beside it). What can
-    be read is printed in any case.
+    damaged, or is not its whole recording (it ended early, or goes on from one, or in one, that does not lie beside
+    it). What can be read is printed in any case.
 
     Example: svev info recordings/jump.mcap
     """
@@ -60,7 +60,7 @@ def info_command(log: LogPath, as_json: AsJson = False) -> None:
         raise LogDamagedError(f"{log}: the log was not closed; check it with `svev verify`")
     if found.damaged_bytes:
         raise LogDamagedError(f"{log}: {found.damaged_bytes} bytes are damaged; see which pulses with `svev verify`")
-    _refuse_a_part(log, found.ended_early, found.part_before)
+    _refuse_a_part(log, found.ended_early, found.part_before, found.part_after)
 
 
 def verify_command(
@@ -109,7 +109,7 @@ def verify_command(
             f"{log}: its ledger does not agree with its tags: {first}; measure nothing at the pulses that are named, "
             "and look at the events of that time"
         )
-    _refuse_a_part(log, report.ended_early, report.part_before)
+    _refuse_a_part(log, report.ended_early, report.part_before, report.part_after)
 
 
 def recover_command(
@@ -144,17 +144,17 @@ def recover_command(
         )
 
 
-def _refuse_a_part(log: Path, ended_early: str, part_before: str) -> None:
+def _refuse_a_part(log: Path, ended_early: str, part_before: str, part_after: str) -> None:
     """Say by the exit code that a sound log does not hold its whole recording.
 
     Raises:
-        LogDamagedError: it ended early, or the log before it does not lie beside it.
+        LogDamagedError: it ended early, or the log before it or after it does not lie beside it.
     """
-    if part_before:
-        raise LogDamagedError(
-            f"{log}: not the whole recording: goes on from {part_before}, which does not lie beside it: put both into "
-            "one folder"
-        )
+    for how, part in (("goes on from", part_before), ("goes on in", part_after)):
+        if part:
+            raise LogDamagedError(
+                f"{log}: not the whole recording: {how} {part}, which does not lie beside it: put both into one folder"
+            )
     if ended_early:
         raise LogDamagedError(f"{log}: not the whole recording: {ended_early}; what it holds is sound")
 
@@ -197,7 +197,9 @@ def _lines(found: LogInfo) -> Iterator[tuple[str, str]]:
         ("compacted", compacted_in_words(found.compacted) if found.compacted else ""),
         ("trouble", found.trouble),
         ("ended early", found.ended_early),
+        ("part", str(found.part) if found.part > 1 or found.next_part else ""),
         ("goes on from", f"{found.part_before}, which does not lie beside it" if found.part_before else ""),
+        ("goes on in", f"{found.part_after}, which does not lie beside it" if found.part_after else ""),
     )
     yield from ((name, text) for name, text in told if text)
     for pause in ledger.pauses()[:_LINES_MAX]:

@@ -31,13 +31,20 @@ def record(
         bool, typer.Option(help="record with any camera that answers, whatever trigger.min_cameras says")
     ] = False,
     session: Annotated[str, typer.Option(metavar="TEXT", help="name of the session, kept in the log")] = "",
+    part_s: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=1, help="go on in another log, the next part, after so many seconds"),
+    ] = None,
+    part_gb: Annotated[
+        float | None, typer.Option(metavar="GB", min=0.001, help="the same before a log is larger, 10^9 bytes")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Record once with the cameras of a rig file, for a number of seconds.
 
-    Makes one log (.mcap) with the frames of all trigger pulses. For each pulse and camera the log says whether the
-    frame came and, if not, why. Ctrl-C ends the recording early; its log is finished properly. A second Ctrl-C does not
-    wait for a disk that is slow or hangs.
+    Makes one log (.mcap) with the frames of all trigger pulses, or several that are its parts (--part-s, --part-gb).
+    For each pulse and camera the log says whether the frame came and, if not, why. Ctrl-C ends the recording early; its
+    log is finished properly. A second Ctrl-C does not wait for a disk that is slow or hangs.
 
     Exit codes: 0 recorded (also if frames are missing: see the counts), 2 bad input, another svev records into the
     folder or the one for a failed disk, or a camera does not answer,
@@ -49,6 +56,7 @@ def record(
     """
     settings = load_rig(rig)
     settings = settings.without_absent() if allow_absent else settings
+    settings = settings.split(part_s, part_gb)
     _check_session(session)
     check_publication(settings.network)
     for camera in settings.cameras:
@@ -70,8 +78,8 @@ def record(
         console.print_json(result)
     else:
         console.say(f"{result['pulses']} pulses, {result['complete']} complete{causes(result)}")
-        for log in result["logs"][:-1]:
-            console.say(f"the first part is in {log}")
+        if earlier := result["logs"][:-1]:
+            console.say(f"{len(earlier)} parts before the last one, the first in {earlier[0]}")
         console.say(f"{result['bytes'] / 1e6:.1f} MB in {result['log']}")
         console.say(f"check it: svev verify {result['log']}")
     if disk_error is not None:

@@ -29,6 +29,7 @@ from tests.recorder.logs import (
     write_log,
     write_pulse,
 )
+from tests.recorder.split import split_log
 from tests.support.waiting import wait_until
 
 JUMP = (ALL_OK, (OK, LOST, OK), (ABSENT,) * 3, ALL_OK)
@@ -323,3 +324,23 @@ def test_whatever_an_address_can_hold_is_listed_and_goes_to_the_trash_and_back(t
     assert second != name
     assert {entry.id for entry in Catalogue(tmp_path).entries(deleted=True)} == {name, second}
     assert catalogue.restore(name).session["bib"] == "17"
+
+
+def test_a_split_recording_is_one_entry(folder: Path) -> None:
+    write_log(folder / "whole.mcap", ((OK, LOST, OK), *(ALL_OK,) * 9))
+    parts = split_log(folder / "whole.mcap", folder / "r1.mcap", (4, 3))
+    catalogue = Catalogue(folder)
+    entries = {entry.id: entry for entry in catalogue.entries()}
+    assert set(entries) == {"whole", "r1"}
+    whole, split = entries["whole"], entries["r1"]
+    assert split.parts == ("r1", "r1-part2", "r1-part3")
+    assert split.bytes == sum(part.stat().st_size for part in parts)
+    told = ("state", "started", "duration_s", "pulses", "complete", "missing", "causes", "failures", "pauses")
+    assert [getattr(split, name) for name in told] == [getattr(whole, name) for name in told]
+    assert catalogue.entry("r1") == split
+    assert [tag.pulse for tag in catalogue.tags("r1")] == list(range(1, 11))
+    assert np.array_equal(catalogue.image("r1", 9), catalogue.image("whole", 9))
+    parts[0].rename(folder.parent / "r1.mcap")
+    assert {entry.id: entry.parts for entry in catalogue.entries()} == {
+        "whole": ("whole",), "r1-part2": ("r1-part2", "r1-part3"),
+    }  # fmt: skip

@@ -126,7 +126,7 @@ def test_a_complete_log_is_clean(tmp_path: Path) -> None:
         "every_byte_checked": True, "pulses": 5, "complete": 5, "partial": 0,
         "causes": {"lost": 0, "missed": 0, "damaged": 0, "absent": 0}, "bytes": (tmp_path / "log.mcap").stat().st_size,
         "missing_pulses": [], "incomplete_pulses": [], "pauses": [], "ended_early": "",
-        "part_before": "", "off_time": [], "misfiled": [], "findings": [], "events": [],
+        "part_before": "", "part_after": "", "off_time": [], "misfiled": [], "findings": [], "events": [],
     }  # fmt: skip
 
 

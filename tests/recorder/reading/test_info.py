@@ -19,7 +19,8 @@ def test_a_log_says_what_it_is(tmp_path: Path) -> None:
         "log": str(path), "closed": True, "truncated": False, "damaged_bytes": 0,
         "pulses": 4, "complete": 2, "partial": 2,
         "causes": {"lost": 1, "missed": 0, "damaged": 0, "absent": 3}, "missing_pulses": 0, "pauses": [],
-        "merged": {}, "trouble": "", "ended_early": "", "part_before": "", "being_written": False,
+        "merged": {}, "trouble": "", "ended_early": "", "being_written": False,
+        "part": 1, "part_before": "", "part_after": "",
         "bytes": path.stat().st_size, "recording": "r1", "start_ns": str(START + PERIOD_NS),
         "offset_us": {"median": 0.5, "max": 1.5}, "shape": [24, 90], "cameras": ["K1", "K2", "K3"],
         "ledger": {

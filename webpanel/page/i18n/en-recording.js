@@ -21,6 +21,7 @@ export const words = {
   "recording.club": "Club",
   "recording.continues": "Goes on from",
   "recording.continued_by": "Goes on in",
+  "recording.parts": "Logs",
   "recording.changed": "Saved.",
   "scrub.all": "All",
   "scrub.zoom_in": "Enlarge",

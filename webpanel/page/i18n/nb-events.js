@@ -32,6 +32,8 @@ export const events = {
   event_ends_early: ["opptaket tar slutt for tidlig: {why}"],
   event_goes_on: ["opptaket {before} fortsetter som {recording}: {why}"],
   event_goes_on_restarted: ["opptaket {before} fortsetter som {recording}: opptaksprosessen ble startet på nytt"],
+  event_next_part: ["opptaket {recording} fortsetter i neste del {path}"],
+  event_no_next_part: ["neste del {path} kan ikke lages: {why}; opptaket fortsetter i samme logg"],
   event_goes_on_in: ["{why}; opptaket fortsetter i {path}"],
   event_there_neither: ["ikke der heller: {why}"],
   event_no_direct_io: ["filsystemet har ikke direkte I/O: det koster mer å skrive"],

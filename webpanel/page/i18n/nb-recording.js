@@ -21,6 +21,7 @@ export const words = {
   "recording.club": "Klubb",
   "recording.continues": "Fortsetter",
   "recording.continued_by": "Fortsetter i",
+  "recording.parts": "Logger",
   "recording.changed": "Lagret.",
   "scrub.all": "Alle",
   "scrub.zoom_in": "Større",

@@ -75,6 +75,7 @@ export const statements = {
   verdict_ended_early: ["Tok slutt for tidlig: {why}. {rest}"],
   verdict_being_written: ["En annen svev tar det opp: {pulses} pulser til nå"],
   verdict_part_gone: ["Fortsetter {before}, som ikke er her: begynnelsen mangler. {rest}", "Se etter første del på den andre disken, eller i en kopi"],
+  verdict_next_part_gone: ["Fortsetter i {before}, som ikke er her: slutten mangler. {rest}", "Se etter den delen i papirkurven, eller i en kopi"],
   verdict_unfinished: ["Ble aldri avsluttet; {pulses} pulser kan leses", "svev recover lager en ordentlig logg av den"],
   verdict_damaged: ["Deler kan ikke leses eller mangler; {pulses} pulser kan leses", "svev recover lager en ordentlig logg av det som kan leses; svev verify sier hva som er skadet"],
   verdict_headless: ["Begynnelsen er skadet, eller det er ingen logg fra svev", "svev recover redder det som kan leses; ellers flytt filen ut av mappen"],

@@ -179,12 +179,12 @@ function drawTitle(session) {
 }
 
 /** @param {Recording} shown */
-function drawFacts({ id, started, duration_s, bytes, counts, more, continues, continued_by }) {
+function drawFacts({ id, started, duration_s, bytes, counts, more, continues, continued_by, parts: files }) {
   const causes = Object.entries(counts.causes).filter(([, count]) => count > 0).map(([cause, count]) => `${count} ${t(`status.${cause}`)}`);
   /** @type {[string, string][]} */
   const listed = Object.entries(more).map(([column, text]) => [column in OF_THE_LIST ? t(OF_THE_LIST[column]) : column, text]);
   /** @type {[string, string][]} */
-  const parts = [[t("recording.continues"), continues], [t("recording.continued_by"), continued_by]];
+  const parts = [[t("recording.continues"), continues], [t("recording.continued_by"), continued_by], [t("recording.parts"), files.length > 1 ? files.join(", ") : ""]];
   fillList($("recording-facts"), [
     ...listed,
     [t("recording.started"), started ? `${day(started)}, ${timeOfDay(started)}` : "–"],

@@ -108,6 +108,7 @@
  * @property {Record<string, string>} more round, club and own columns of the start list
  * @property {string} continues id of the recording of which this is the next part
  * @property {string} continued_by id of the recording that is the next part of this one
+ * @property {string[]} parts ids of the logs that the recording is split into, in their order
  *
  * @typedef {object} Trash
  * @property {number} recordings

@@ -11,6 +11,7 @@ from typing import Final
 from av.error import FFmpegError
 
 from rig.errors import BadInputError, StorageError
+from rig.host.disk import sync
 from rig.host.file_names import unfinished_path
 from rig.phrase import phrase
 
@@ -34,6 +35,7 @@ def whole_file(out: Path) -> Iterator[Path]:
             with part.open("rb") as written:
                 os.fsync(written.fileno())
             part.replace(out)
+            sync(out.parent)
     finally:
         with suppress(OSError):  # gone, if it has taken its place; the error of the disk, if any, is told above
             part.unlink()
@@ -57,7 +59,10 @@ def whole_folder(out: Path) -> Iterator[Path]:
             shutil.rmtree(part, ignore_errors=True)  # of a program that was killed
             part.mkdir()
             yield part
+            for made in part.iterdir():
+                sync(made)
             part.replace(out)
+            sync(out.parent)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 

@@ -39,6 +39,7 @@ from recorder.reading.triplets import stored_image, tags
 from rig.api.athletes import JumpQuery
 from rig.api.recordings import RecordingQuery
 from rig.errors import LogDamagedError, StillRecordingError, StorageError, UnknownRecordingError
+from rig.host.disk import sync
 from rig.host.file_names import ID_BYTES_MAX, give_name, is_recording_id
 from rig.host.files import make_folder, opened_folder
 from rig.images.picture import shown
@@ -265,6 +266,7 @@ class Catalogue:
                 log, path = path, self._free_path(path, self._trash)
                 give_name(log, path)  # after a crash here the files beside it are where `restore` leaves them
                 _move_beside(log, path)
+                self._keep_names()
         return self.entry(path.stem)
 
     def restore(self, recording: str) -> Entry:
@@ -280,6 +282,7 @@ class Catalogue:
                 log, path = path, self._free_path(path, self.directory)
                 _move_beside(log, path)
                 give_name(log, path)
+                self._keep_names()
         return self.entry(path.stem)
 
     def trash(self) -> TrashContents:
@@ -337,6 +340,11 @@ class Catalogue:
             before = time.time() - older_than_s
             logs = [log for log in trashed_logs(self.directory) if log.since <= before]
             return _remove(oldest_until(logs, wanted_bytes))
+
+    def _keep_names(self) -> None:
+        """Have the disk take which files lie in the folder, and which in its trash."""
+        for folder in (self._trash, self.directory):
+            sync(folder)
 
     @contextmanager
     def _change(self) -> Iterator[None]:

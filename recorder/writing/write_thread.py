@@ -1,4 +1,4 @@
-"""Writes chunks to the disk in a thread of its own, in order, makes them durable once a second, and closes the file.
+"""Writes chunks to the disk in a thread of its own, in order, makes them durable twice a second, and closes the file.
 
 All calls that may wait for the disk are made here, so that nobody else ever waits for a disk that hangs.
 """
@@ -9,7 +9,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from recorder.log.index import LogIndex
 from recorder.log.mcap_layout import ChunkPlan, join_pages
@@ -18,7 +18,9 @@ from rig.errors import StorageError
 from rig.health import WritingHealth
 from rig.phrase import phrase
 
-SYNC_INTERVAL_S = 1.0
+#: What was written is made durable after so long: the disk has as much again until it is a second old.
+_SYNC_INTERVAL_S: Final = 0.5
+_LOOK_INTERVAL_S: Final = 1.0
 _SMALL_AT_ONCE = 64
 #: So many small chunks wait only if the disk has taken nothing for minutes.
 _SMALL_WAITING_MAX = 20_000
@@ -163,7 +165,7 @@ class WriteThread:
                 if not self._jobs:
                     self._busy_since = None
                     if not self.stopping:
-                        self._wake.wait(SYNC_INTERVAL_S)
+                        self._wake.wait(_SYNC_INTERVAL_S)
                 if self._jobs:
                     return self._take()
                 if self.stopping:
@@ -222,11 +224,11 @@ class WriteThread:
         self._keep_up()
 
     def _keep_up(self) -> None:
-        """Once a second: make durable what was written, see whether the file is still in its place."""
+        """Now and then: make durable what was written, see whether the file is still in its place."""
         now = time.monotonic()
-        if self._unsynced_since is not None and now - self._unsynced_since >= SYNC_INTERVAL_S:
+        if self._unsynced_since is not None and now - self._unsynced_since >= _SYNC_INTERVAL_S:
             self._sync()
-        if now - self._looked >= SYNC_INTERVAL_S:
+        if now - self._looked >= _LOOK_INTERVAL_S:
             self.free_bytes = self._file.look()
             self._looked = now
 

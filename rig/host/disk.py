@@ -59,6 +59,7 @@ def replace_file(path: Path, content: bytes, *, links: bool) -> None:
             file.flush()
             os.fsync(file.fileno())
         new.replace(path)
+        sync(path.parent)  # a file system that keeps a journal writes names seconds later
     except OSError:
         new.unlink(missing_ok=True)
         raise

@@ -16,6 +16,7 @@ import duckdb
 
 from recorder.log.session_changes import session_changes, session_path
 from rig.errors import BadInputError, StorageError
+from rig.host.disk import sync
 from season.campaign import Campaign
 from season.rows import Table, tables
 from season.running.logs import SeasonLog, day_of
@@ -83,9 +84,10 @@ def build(campaign: Campaign, logs: Sequence[SeasonLog], *, force: bool = False)
                 for name in names:
                     parquet = Path(scratch) / f"{name}.parquet"
                     database.execute(f"COPY {name} TO '{_quoted(parquet)}' (FORMAT parquet, COMPRESSION zstd)")
-            for name in names:
-                (Path(scratch) / f"{name}.parquet").replace(campaign.out / f"{name}.parquet")
-            made.replace(campaign.out / DATABASE)
+            for table in (*(Path(scratch) / f"{name}.parquet" for name in names), made):  # the mark is in the last one
+                sync(table)
+                table.replace(campaign.out / table.name)
+            sync(campaign.out)
     except (OSError, duckdb.IOException) as error:
         raise StorageError(f"{campaign.out}: the tables cannot be made ({error}); run the season again") from error
     return True

@@ -33,7 +33,7 @@ def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...], names: Mappi
     """
     outcome = Outcome(measured=datetime.now(UTC), version=_VERSION, jumps=jumps, names=dict(names))
     write_outcome(outcome, made)
-    for path in made.iterdir():
+    for path in (*made.iterdir(), made):
         sync(path)
     target, old = measured_path(log), made.with_name(f"{made.name}.old")
     if os.path.lexists(target):

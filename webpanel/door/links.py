@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from rig.host.disk import sync
 from rig.host.files import read_own
 from rig.phrase import Phrase, phrase
 from webpanel.door.link_file import KeptLink, LinkFile
@@ -84,6 +85,7 @@ def _make_secret(path: Path) -> bytes:
         file.write(value)
         file.flush()
         os.fsync(file.fileno())
+    sync(path.parent)
     return value
 
 

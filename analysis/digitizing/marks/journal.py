@@ -15,6 +15,7 @@ import msgspec
 
 from rig.api.digitizing import MarkSource, MarkState
 from rig.errors import BadInputError, StorageError
+from rig.host.disk import sync
 from rig.phrase import phrase
 
 FORMAT: Final = "svev-digitizing/1"
@@ -157,6 +158,8 @@ class Journal:
             head = _ENCODE(_Head(FORMAT, self._recording, self._operator)) + b"\n"
             os.pwrite(self._fd, head, 0)
             os.fsync(self._fd)
+            for folder in (self.path.parent, self.path.parent.parent):  # both may be new
+                sync(folder)
             self._whole = len(head)
             return ()
         return self._read(text)

@@ -14,6 +14,7 @@ from analysis.measurements.model import Measurements
 from rig.api.digitizing import HandResult
 from rig.background.errands import Errands
 from rig.background.messages import Progress
+from rig.host.disk import sync
 from rig.phrase import Phrase
 
 _SUFFIX: Final = ".result"
@@ -99,8 +100,11 @@ class Computing:
 
     def _done(self, operator: str, computed: ComputedJump, made: Path) -> HandResult:
         whole = self._folder / f"{operator}{_SUFFIX}"
+        for file in (made / RESULT).iterdir():
+            sync(file)
         shutil.rmtree(whole, ignore_errors=True)
         (made / RESULT).rename(whole)
+        sync(self._folder)
         return HandResult(state="done", said=computed.said, files=computed.files)
 
 

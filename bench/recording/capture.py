@@ -37,7 +37,7 @@ def run_capture(load: Load, seconds: float, directory: Path, publish: str) -> di
         result: dict[str, Any] = {"load": load.name, "MB_per_s": round(load.bytes_per_s / 1e6, 1), "seconds": seconds}
         result["svev"] = _record(load, seconds, directory, publish)
         result["svev, one subscriber"] = _record(load, seconds, directory, publish, hill)
-        result[SPLIT] = _record(load, seconds, directory, publish, hill, seconds / _PARTS)
+        result[SPLIT] = _record(load, seconds, directory, publish, hill, max(1.0, seconds / _PARTS))
         for sink in SINKS:
             result[sink] = run_gstreamer(load, rig, sink, seconds, directory)
     ours = result["svev"]["cpu_s_per_GB"]

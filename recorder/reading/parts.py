@@ -1,33 +1,19 @@
 """Reads a recording that is split into several logs as if it were one."""
 
 import os
-import re
 from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
-from typing import Final
 
 from recorder.log.extent import CONTINUES, part_number
+from recorder.log.part_path import named, numbered
 from recorder.reading.items import Chunk, Item
 from recorder.reading.log_reader import LogReader
 from rig.errors import BadInputError
 from rig.topics import RECORDING_METADATA, SESSION_METADATA
-
-_NAMED: Final = re.compile(r"(?P<first>.+)-part(?P<number>[1-9]\d{0,5})", re.ASCII)
-
-
-def numbered(log: Path) -> tuple[str, int]:
-    """Name of the first log of a recording by that of one of its logs, and the number in it; 1: it is the first one."""
-    named = _NAMED.fullmatch(log.stem)
-    return (log.stem, 1) if named is None else (named["first"], int(named["number"]))
-
-
-def named(first: str, number: int, like: Path) -> Path:
-    """The log of this number, beside another one."""
-    return like.with_name(f"{first}{f'-part{number}' if number > 1 else ''}{like.suffix}")
 
 
 def parts_of(log: Path) -> tuple[Path, ...]:

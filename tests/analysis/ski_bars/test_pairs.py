@@ -33,7 +33,7 @@ def test_both_skis_are_found_from_about_where_the_feet_are(seed: int, off_m: tup
         true = np.array([of.truth[pulse]["skis"][side]["direction"] for pulse in pulses])
         turned = np.degrees(np.arccos(np.clip((true * found.direction[:, k]).sum(axis=1), -1, 1)))
         off = found.point[:, k] - _true(of, pulses, label)
-        assert np.median(turned) < 12.0, "a fit begins there"
+        assert np.median(turned) < 15.0, "a fit begins there"
         assert np.median(np.abs(off[:, 2])) < 0.2
         assert np.median(np.abs(off[:, 1])) < 0.4, "cameras beside the hill tell this least"
 

@@ -349,8 +349,8 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
 def _as_ski(grey: Floats, behind: Floats, variance: Floats, arms: Flags, r: Floats) -> Floats:
     """How much likelier pixels (..., n) of lines are as a ski than as anything, logarithms.
 
-    How bright the ski is tells that part of the line that fits best: an arm may be hidden, and
-    a ski that leads towards a camera is short.
+    How bright the ski is tells its whole length or its half near the binding, whichever fits better: a ski that leads
+    towards a camera is short in the image.
 
     Args:
         grey: values.
@@ -363,7 +363,7 @@ def _as_ski(grey: Floats, behind: Floats, variance: Floats, arms: Flags, r: Floa
     nothing = np.log(0.5 * scene + 0.5 * _ANYTHING)
     near = arms & (np.abs(r) < np.abs(r[arms]).max() / 2)
     best, most = nothing, np.full((*grey.shape[:-1], 1), -np.inf)
-    for part in (arms, near, near & (r > 0), near & (r < 0)):
+    for part in (arms, near):
         bright = np.median(grey[..., part], axis=-1, keepdims=True)
         misfit = variance + (_MODEL * (bright - behind)) ** 2 + _ROUGH**2
         ski = np.log(_ON_SKI * _density(grey - bright, misfit) + _THROUGH * scene + _COVERED * _ANYTHING) - nothing

@@ -32,7 +32,7 @@ from tests.test_docs import FENCE, PAGES, ROOT
 #: What is not run, by the beginning of the command, and why.
 NOT_RUN: Final = {
     r"make |bash \.ci/run": "targets of the Makefile: `make check` and CI are these",
-    r"sudo |pipx |printf .*\| sudo|su -|apt |adduser |exit$|systemctl ": "changes the computer, as root",
+    r"sudo |pipx |(?:printf|echo) .*\| sudo|su -|apt |adduser |exit$|systemctl ": "changes the computer, as root",
     r"git clone |cd svev|source \.venv|tar xf ": "the checkout and the bundle: .ci/try-wheel, tests/systemd",
     r"rsync ": "needs another computer",
 }

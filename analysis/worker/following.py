@@ -23,9 +23,9 @@ from analysis.identification.ski_bars import MeasuredSkis, ski_views
 from analysis.identification.space.body import BINDINGS, REACH_M
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
-from analysis.measurements.model import POINTS, SIDES, JumpMeasurements, MeasuredCamera, PulseMeasurements
+from analysis.measurements.model import SIDES, JumpMeasurements, MeasuredCamera, PulseMeasurements
 from analysis.motion.causal import CausalFilter
-from analysis.procedure.names import measured_parts, told_names, told_state
+from analysis.procedure.names import measured_parts, told_names, told_state, untold_parts
 from analysis.result.model import JumperState, SmoothedState, Status
 from analysis.scene.camera_system import CameraSystem
 from analysis.ski_bars.directions import HEADING_SIGMA, SLOPE_SIGMA
@@ -174,7 +174,7 @@ class Follower:
 
     def _learn_names(self, states: Sequence[SmoothedState]) -> None:
         """Learn which names of markers more states bear out; what was told once is not taken back."""
-        if len(self._told) < len(POINTS):
+        if untold_parts(self._told):
             self._measured += map(measured_parts, states)
             self._told |= told_names(self._measured)
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from analysis.candidates.model import SecondLook
-from analysis.identification.markers.markers import Markers, with_bindings
+from analysis.identification.markers.markers import Markers, nearest_known, with_bindings
 from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.window import Window
 from analysis.identification.ski_bars import MeasuredSkis, ski_views
@@ -120,9 +120,8 @@ def off_skis(views: Views, window: Window, markers: Markers, skis: Sequence[Meas
                 told[t, i] = True
                 off[t, i] |= aside > _SIGMAS * _MARKER_M * views.scale[k]
     for i in range(SKIS):
-        known = np.flatnonzero(told[:, i])
-        if len(known):
-            off[:, i] = off[known[np.abs(np.arange(len(off))[:, None] - known).argmin(axis=1)], i]
+        if told[:, i].any():
+            off[:, i] = off[nearest_known(told[:, i]), i]
     return off
 
 

@@ -338,7 +338,7 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
     nothing = np.log(0.5 * scene + 0.5 * _ANYTHING)
     free = np.where(inside, np.log(_FREE * scene + (1 - _FREE) * _ANYTHING) - nothing, 0.0)
     arms = (np.abs(r) > BOOT_M) & (np.abs(r) < SHOVEL_M)
-    gain = _as_ski(grey[:, on], behind[:, on], variance[:, on], arms, r)
+    gain = _as_ski(grey[:, on], behind[:, on], variance[:, on], scene[:, on], arms, r) - nothing[:, on]
     gain += 0.5 * (free[:, : 2 * side + 1] + free[:, 2 * beside :])
     gain[~inside[:, on] | (np.abs(r) < BOOT_M)] = 0.0
     alike = min(1.0, _ALONG_M * scale / _ALIKE_PX)
@@ -346,8 +346,8 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
     return np.concatenate((np.zeros((*gain.shape[:2], 1)), alike * np.cumsum(gain, axis=-1)), axis=-1), aside
 
 
-def _as_ski(grey: Floats, behind: Floats, variance: Floats, arms: Flags, r: Floats) -> Floats:
-    """How much likelier pixels (..., n) of lines are as a ski than as anything, logarithms.
+def _as_ski(grey: Floats, behind: Floats, variance: Floats, scene: Floats, arms: Flags, r: Floats) -> Floats:
+    """Densities of pixels (..., n) of lines that a ski lies on, logarithms.
 
     How bright the ski is tells its whole length or its half near the binding, whichever fits better: a ski that leads
     towards a camera is short in the image.
@@ -356,20 +356,19 @@ def _as_ski(grey: Floats, behind: Floats, variance: Floats, arms: Flags, r: Floa
         grey: values.
         behind: of the static scene.
         variance: of the noise.
+        scene: densities of the pixels, if they show the static scene.
         arms: (n,) where the ski is, but for boot and shovel.
         r: (n,) m along the lines.
     """
-    scene = _density(grey - behind, variance)
-    nothing = np.log(0.5 * scene + 0.5 * _ANYTHING)
-    near = arms & (np.abs(r) < np.abs(r[arms]).max() / 2)
-    best, most = nothing, np.full((*grey.shape[:-1], 1), -np.inf)
-    for part in (arms, near):
+
+    def with_brightness_of(part: Flags) -> Floats:
         bright = np.median(grey[..., part], axis=-1, keepdims=True)
         misfit = variance + (_MODEL * (bright - behind)) ** 2 + _ROUGH**2
-        ski = np.log(_ON_SKI * _density(grey - bright, misfit) + _THROUGH * scene + _COVERED * _ANYTHING) - nothing
-        total = ski[..., arms].sum(axis=-1, keepdims=True)
-        best, most = np.where(total > most, ski, best), np.maximum(total, most)
-    return best
+        return np.asarray(np.log(_ON_SKI * _density(grey - bright, misfit) + _THROUGH * scene + _COVERED * _ANYTHING))
+
+    whole, near = (with_brightness_of(of) for of in (arms, arms & (np.abs(r) < np.abs(r[arms]).max() / 2)))
+    better = (near - whole)[..., arms].sum(axis=-1, keepdims=True) > 0.0
+    return np.where(better, near, whole)
 
 
 def _density(off: Floats, variance: Floats) -> Floats:

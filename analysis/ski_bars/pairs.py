@@ -83,9 +83,10 @@ class _Ski:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Grid:
-    """Directions (n, 3), the logarithm (n,) of the density of each, and the frame (3, 3) of all."""
+    """Directions (n, 3), their slopes and headings (n, 2), the logarithm (n,) of the density of each, and the frame."""
 
     direction: Floats
+    angles: Floats
     density: Floats
     axes: Floats
 
@@ -104,8 +105,10 @@ def seek_pairs(pulses: Sequence[Sequence[SkiView]], feet: Feet, time_s: Floats, 
         for s in (SLOPE_SIGMA, HEADING_SIGMA)
     )
     density = -0.5 * ((slope[:, None] / SLOPE_SIGMA) ** 2 + (heading / HEADING_SIGMA) ** 2)
-    grid = _Grid(directions(slope, heading, axes).reshape(-1, 3), density.ravel(), axes)
-    found = [list(_pairs(views, feet, t, grid, axes)) for t, views in enumerate(pulses)]
+    direction = directions(slope, heading, axes).reshape(-1, 3)
+    angles = np.array([slope_and_heading(of) for of in direction @ axes.T])
+    grid = _Grid(direction, angles, density.ravel(), axes)
+    found = [list(_pairs(views, feet, t, grid)) for t, views in enumerate(pulses)]
     chosen = _path(found, feet.xyz, time_s, axes)
     return Pairs(
         np.array([[ski.point for ski in pair] for pair in chosen]),
@@ -114,17 +117,17 @@ def seek_pairs(pulses: Sequence[Sequence[SkiView]], feet: Feet, time_s: Floats, 
     )
 
 
-def _pairs(views: Sequence[SkiView], feet: Feet, t: int, grid: _Grid, axes: Floats) -> Iterator[tuple[_Ski, _Ski]]:
+def _pairs(views: Sequence[SkiView], feet: Feet, t: int, grid: _Grid) -> Iterator[tuple[_Ski, _Ski]]:
     """The likeliest pairs of a pulse, right ski and left one."""
-    spread = axes.T @ np.diag(feet.apart_sigma**2) @ axes
+    spread = grid.axes.T @ np.diag(feet.apart_sigma**2) @ grid.axes
     anywhere = feet.covariance[t] + (spread + np.outer(feet.apart, feet.apart)) / 4
-    angles = np.array([slope_and_heading(d) for d in grid.direction @ axes.T])
     for first in _skis(views, feet.xyz[t], anywhere, grid, None, _FIRST):
         alone = _far(first.point - feet.xyz[t], anywhere)
-        off = angles - slope_and_heading(axes @ first.direction)
+        off = grid.angles - slope_and_heading(grid.axes @ first.direction)
         for side in (1, -1):
             opening = (side * off[:, 1] - OPENING) / OPENING_SIGMA
-            beside = _Grid(grid.direction, grid.density - 0.5 * ((off[:, 0] / SLOPES_APART) ** 2 + opening**2), axes)
+            apart = (off[:, 0] / SLOPES_APART) ** 2 + opening**2
+            beside = replace(grid, density=grid.density - 0.5 * apart)
             (second,) = _skis(views, first.point + side * feet.apart, spread, beside, first, 1)
             # what is known is where the middle of both is
             middle = _far((first.point + second.point) / 2 - feet.xyz[t], feet.covariance[t])

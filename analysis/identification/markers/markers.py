@@ -179,12 +179,16 @@ def without_bindings(markers: Markers, left_out: Flags) -> Markers:
         points: Flags = np.isfinite(markers.assigned.xyz[:, marker, 0])
         if not np.any(left_out[:, place] & points):
             continue
-        known, all_of = np.flatnonzero(points), np.arange(len(points))
-        nearest = known[np.abs(all_of[:, None] - known).argmin(axis=1)]
-        out[:, marker] = left_out[nearest, place] & np.any(markers.assigned.rays[:, marker] >= 0, axis=1)
+        out[:, marker] = left_out[nearest_known(points), place] & np.any(markers.assigned.rays[:, marker] >= 0, axis=1)
     rays, xyz = markers.assigned.rays.copy(), markers.assigned.xyz.copy()
     rays[out], xyz[out] = -1, np.nan
     return replace(markers, assigned=replace(markers.assigned, rays=rays, xyz=xyz))
+
+
+def nearest_known(known: Flags) -> Integers:
+    """For each of t pulses the nearest one that is known (t,); at least one is."""
+    at = np.flatnonzero(known)
+    return np.asarray(at[np.abs(np.arange(len(known))[:, None] - at).argmin(axis=1)])
 
 
 def _assigned(views: Views, window: Window, flight: Flight, xyz: Floats, covariance: Floats) -> Markers:

@@ -10,7 +10,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,15 +29,6 @@ pytestmark = pytest.mark.long
 DISK = "The disk"
 AFTER = "those from then on"
 SVEV = [sys.executable, "-m", "svev"]
-
-
-@pytest.fixture
-def disk(tmp_path: Path) -> Iterator[FaultyDisk]:
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    disk = FaultyDisk(folder)
-    yield disk
-    disk.close()
 
 
 class Record:

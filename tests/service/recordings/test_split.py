@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,15 +26,6 @@ from tests.support.stamps import hill_pulses
 from tests.support.waiting import wait_until
 
 SVEV = [sys.executable, "-m", "svev"]
-
-
-@pytest.fixture
-def disk(tmp_path: Path) -> Iterator[FaultyDisk]:
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    disk = FaultyDisk(folder)
-    yield disk
-    disk.close()
 
 
 def _rig(folder: Path, loopback: Loopback, recorder: str = "") -> Path:

@@ -14,6 +14,9 @@ from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, canvas_o
 from tests.browser.touch import Fingers
 from tests.support.waiting import wait_until
 
+#: The pulse in which a ski is drawn: no image shows the other one over it. Where that lies, what is seen of a ski is
+#: near the least that is accepted, and the shake of the hand decides.
+APART = 16
 #: Colour of the curves that come from K1, as `overlay.js` has it.
 RED = np.array([255, 107, 107])
 
@@ -329,7 +332,7 @@ def test_what_was_measured_automatically_is_taken_over_by_one_key_and_never_redo
 def test_a_ski_that_is_drawn_in_two_images_is_found_in_all(desk: Desk, open_page: Open, hand: str) -> None:
     """The hand shakes by a pixel or two. What it drew stands until two images have the ski."""
     touch: dict[str, Any] = {"has_touch": True, "is_mobile": True} if hand == "finger" else {}
-    page = enter(open_page, desk, width=1366, height=1024, **touch)
+    page = enter(open_page, desk, APART, width=1366, height=1024, **touch)
     page.locator("#loupe").select_option("0")
     for camera in ("K1", "K2"):
         page.locator(f'.pane[data-camera="{camera}"] .pane-name').click() if camera != "K1" else None
@@ -344,8 +347,8 @@ def test_a_ski_that_is_drawn_in_two_images_is_found_in_all(desk: Desk, open_page
                 assert {vertex["sigma"] for vertex in line["vertices"]} == {None}
     expect(page.locator("#track-said li")).to_contain_text("it was refined", timeout=60_000)
     expect(_thing(page, "right ski").locator('.sign:is([data-letter="r"], [data-letter="t"])')).to_have_count(3)
-    ski = desk.log.truth[PULSE]["skis"]["right"]
-    slope = desk.view()["lines"]["right ski"]["slope"]
+    ski = desk.log.truth[APART]["skis"]["right"]
+    slope = desk.view(APART)["lines"]["right ski"]["slope"]
     assert abs(slope["value"] - np.degrees(np.arcsin(ski["direction"][2]))) < 5 * slope["sigma"]
 
 
@@ -375,7 +378,7 @@ def _kept_line(desk: Desk, camera: str) -> dict[str, Any]:
     lines: list[dict[str, Any]] = []
 
     def whole() -> bool:
-        line = desk.mark(camera, "right ski")
+        line = desk.mark(camera, "right ski", APART)
         if line is not None:
             lines.append(line)
         return line is not None and len(line["vertices"]) == (5, 2)[line["vertices"][0]["source"] == "refined"]
@@ -389,7 +392,7 @@ def _signs_of(page: Page, thing: str, image: int) -> Any:
 
 
 def _ends(desk: Desk, camera: str) -> list[Floats]:
-    ski = desk.log.truth[PULSE]["skis"]["right"]
+    ski = desk.log.truth[APART]["skis"]["right"]
     return [desk.image(camera, np.array(ski["point"]) + s * np.array(ski["direction"])) for s in (-0.9, 0.9)]
 
 

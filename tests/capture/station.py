@@ -56,4 +56,4 @@ class Station:
             self.take(release=release)
             return sum(isinstance(record, kind) for record in self.records) >= count
 
-        wait_until(enough, f"{count} records {kind.__name__}", 10)
+        wait_until(enough, f"{count} records {kind.__name__}")

@@ -4,13 +4,15 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+#: How long a condition is awaited: it comes in a second or two, on a machine with much else to do it may take long.
+PATIENCE_S: Final = 60.0
 #: What is long in coming is looked at more rarely, after a further share of the time that was waited, but at least this
 #: often: a look may be a call of a service, and takes processor time that what is awaited would need.
 _SHARE: Final = 0.05
 _RAREST_S: Final = 0.1
 
 
-def wait_until(condition: Callable[[], bool], what: str, timeout_s: float = 5.0, poll_s: float = 0.01) -> None:
+def wait_until(condition: Callable[[], bool], what: str, timeout_s: float = PATIENCE_S, poll_s: float = 0.01) -> None:
     """Return as soon as `condition` holds.
 
     Args:

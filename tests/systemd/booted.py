@@ -100,7 +100,7 @@ def _init(unshare: int) -> int:
         found[:] = [int(pid) for pid in children.read_text().split()] if children.exists() else []
         return bool(found) and Path(f"/proc/{found[0]}/root/run/systemd/private").exists()
 
-    wait_until(started, "systemd answers", 20)
+    wait_until(started, "systemd answers")
     return found[0]
 
 

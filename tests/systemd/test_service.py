@@ -30,7 +30,7 @@ def prefix(tmp_path: Path) -> Path:
 def systemd(prefix: Path) -> Iterator[Booted]:
     """Runs, and the service is ready."""
     with booted(prefix) as system:
-        wait_until(lambda: system.show("ActiveState") == "active", "the service is ready", 30)
+        wait_until(lambda: system.show("ActiveState") == "active", "the service is ready")
         yield system
 
 
@@ -41,7 +41,7 @@ def _ctl(system: Booted, *arguments: str) -> dict[str, object]:
 
 
 def _await_state(system: Booted, state: str) -> None:
-    wait_until(lambda: _ctl(system, "status")["state"] == state, f"the state is {state}", 30)
+    wait_until(lambda: _ctl(system, "status")["state"] == state, f"the state is {state}")
 
 
 def test_stopping_the_unit_finishes_the_recording(systemd: Booted) -> None:
@@ -66,7 +66,7 @@ def test_a_service_that_hangs_is_started_again(systemd: Booted) -> None:
     systemd.run("kill", "-STOP", first)
 
     wait_until(lambda: systemd.show("NRestarts") == "1", "the watchdog has fired", 60)
-    wait_until(lambda: systemd.show("ActiveState") == "active", "the service is ready again", 30)
+    wait_until(lambda: systemd.show("ActiveState") == "active", "the service is ready again")
     assert systemd.show("MainPID") != first
     assert _ctl(systemd, "status")["state"] == "idle"
 
@@ -74,7 +74,7 @@ def test_a_service_that_hangs_is_started_again(systemd: Booted) -> None:
 def test_a_wrong_rig_file_is_not_tried_again(prefix: Path) -> None:
     (prefix / "etc/svev/rig.toml").write_text("name = 3\n")
     with booted(prefix) as system:
-        wait_until(lambda: system.show("ActiveState") == "failed", "the service has given up", 30)
+        wait_until(lambda: system.show("ActiveState") == "failed", "the service has given up")
         assert system.show("ExecMainStatus") == "2"
         assert system.show("NRestarts") == "0"
         assert "rig.toml" in system.log()
@@ -126,7 +126,7 @@ def test_a_second_disk_can_be_written_when_the_unit_is_told(prefix: Path) -> Non
     fallback = '[recorder]\nfallback_directory = "/opt/second"\n[service]\narm_at_start = true\n'
     rig.write_text(f"{rig.read_text()}\n{fallback}")
     with booted(prefix) as system:
-        wait_until(lambda: system.show("ActiveState") == "active", "the service is ready", 30)
+        wait_until(lambda: system.show("ActiveState") == "active", "the service is ready")
         _await_state(system, "armed")
         system.run("install", "-d", "-o", "svev", "/opt/second")
         level, what = _second_disk(system)

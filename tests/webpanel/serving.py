@@ -71,7 +71,7 @@ def serving(
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="panel")
     thread.start()
     try:
-        wait_until(lambda: server.started or not thread.is_alive(), "the panel answers", 20)
+        wait_until(lambda: server.started or not thread.is_alive(), "the panel answers")
         yield Panel(access.host, port, service, server, desks)
     finally:
         server.should_exit = True
@@ -80,7 +80,7 @@ def serving(
         listener.close()
         service.exports.close()
     assert not thread.is_alive()
-    wait_until(lambda: not _workers(), "the server's worker threads have ended", 20)
+    wait_until(lambda: not _workers(), "the server's worker threads have ended")
     desks.close()  # what a request that was under way has opened meanwhile
 
 

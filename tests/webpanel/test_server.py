@@ -102,8 +102,8 @@ def test_who_does_not_read_is_dropped(hasty: Panel, service: MemoryService) -> N
         raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         raw.sendall(b"GET /api/recordings/long/file HTTP/1.1\r\nHost: localhost\r\n\r\n")
         wait_until(lambda: len(hasty.server.server_state.connections) == 1, "the client is connected")
-        wait_until(lambda: not hasty.server.server_state.connections, "the client is dropped", 20)
-        wait_until(lambda: not hasty.server.server_state.tasks, "nothing is left of it", 20)
+        wait_until(lambda: not hasty.server.server_state.connections, "the client is dropped")
+        wait_until(lambda: not hasty.server.server_state.tasks, "nothing is left of it")
 
 
 def test_a_slow_start_after_an_answer_ends_too(hasty: Panel) -> None:

@@ -263,12 +263,12 @@ def test_nothing_takes_the_computer_from_a_recording(jump: HillLog) -> None:
     source = read_source(jump.survey, None)
     desk = Desk(files, lambda: source, lambda: recording)
     said = "a recording runs: the cameras are oriented when it has ended"
-    wait_until(lambda: str(desk.opening().orientation.message) == said, "orienting stands still", 20)
+    wait_until(lambda: str(desk.opening().orientation.message) == said, "orienting stands still")
     changed = desk.act("Anna", PlaceAction(do="place", pulse=20, camera="K1", thing="P1", xy=(10, 20)))
     assert changed.view is not None
     assert changed.view.space == {}
     assert desk.programs.follow("Anna", TrackOrder(things=["P1"], pulse=20, direction=1, most=2)).state == "tracking"
-    wait_until(lambda: desk.programs.follower.state("Anna").paused, "following stands still", 20)
+    wait_until(lambda: desk.programs.follower.state("Anna").paused, "following stands still")
     recording = False
     desk.programs.orienting.wait(PATIENCE_S)
     assert desk.opening().orientation.state == "done"
@@ -284,7 +284,7 @@ def test_clicked_balls_orient_the_cameras(jump: HillLog) -> None:
     balls = desk.programs.orienting.balls
     assert balls is not None
     desk.programs.orient("Bo")
-    wait_until(lambda: desk.programs.orienting.state.state != "working", "nobody clicked a ball", 30)
+    wait_until(lambda: desk.programs.orienting.state.state != "working", "nobody clicked a ball")
     assert "an image needs 4 clicked balls or more" in str(desk.programs.orienting.state.message)
     random = np.random.default_rng(8)
     for name, camera in true.cameras.items():

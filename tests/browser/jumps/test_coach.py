@@ -97,7 +97,7 @@ def test_the_screen_shows_the_last_jump_without_a_hand(hill: Hill, service: Memo
     assert not [path for path in asked[before:] if "/pulses/" in path]
     service.stop_recording(started.id)
     expect(page.locator("#coach-who")).to_have_text("5 · name unknown")
-    wait_until(lambda: f"api/recordings/{started.id}/link" in asked, "the code of this jump is asked for", 20)
+    wait_until(lambda: f"api/recordings/{started.id}/link" in asked, "the code of this jump is asked for")
     expect(page.locator("#coach-far")).to_have_text("Not measured")
     expect(page.locator("#coach-figures")).to_be_hidden()
     expect(replay).to_have_attribute("data-stage", "ready")

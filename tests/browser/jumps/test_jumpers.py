@@ -83,7 +83,7 @@ def test_what_is_typed_while_a_jumper_begins_is_never_the_next_ones(
     client.patch("/api/next-jumper", json={"gate": "9"}).raise_for_status()
     expect(page.get_by_role("textbox", name="Gate")).to_have_value("9")
     expect(athlete).to_have_value("Beritx")
-    wait_until(lambda: service.jumpers.view().next.session.athlete == "Beritx", "it is sent while he types", 10)
+    wait_until(lambda: service.jumpers.view().next.session.athlete == "Beritx", "it is sent while he types")
     client.patch("/api/next-jumper", json={"athlete": "Berit"}).raise_for_status()
     page.keyboard.press("Tab")
     expect(athlete).to_have_value("Berit")

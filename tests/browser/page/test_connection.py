@@ -95,7 +95,7 @@ def test_without_shared_workers_a_hidden_tab_gives_its_connections_back(
     await_picture(page)
     streams = open_streams(panel)
     page.evaluate(SHOWN, False)
-    wait_until(lambda: streams.events.open == streams.pictures.open == 0, "the connections are given back", 20)
+    wait_until(lambda: streams.events.open == streams.pictures.open == 0, "the connections are given back")
     service.disarm()
     page.evaluate(SHOWN, True)
     expect(page.locator("#state-word")).to_have_text("Idle")
@@ -138,4 +138,4 @@ def test_who_logs_out_in_one_tab_sees_nothing_in_the_others(
         for page in (first, second):
             expect(page.locator("#login")).to_be_visible()
         expect(first.locator("#state-word")).to_have_text("Waiting")
-        wait_until(lambda: open_streams(panel).events.open == 0, "the stream has ended", 20)
+        wait_until(lambda: open_streams(panel).events.open == 0, "the stream has ended")

@@ -250,12 +250,12 @@ def test_the_preview_runs_only_while_it_is_looked_at(panel: Panel, service: Memo
     page.goto(f"{panel.url}/#/log")
     expect(image).not_to_have_attribute("src", PICTURE)
     pictures = panel.server.config.app.state.streams.pictures  # type: ignore[union-attr]
-    wait_until(lambda: pictures.open == 0, "nobody waits for a picture", 20)
+    wait_until(lambda: pictures.open == 0, "nobody waits for a picture")
     page.goto(f"{panel.url}/#/live")
     expect(image).to_have_attribute("src", PICTURE)
     page.evaluate(HIDE)
     expect(image).not_to_have_attribute("src", PICTURE)
-    wait_until(lambda: pictures.open == 0, "nobody waits for a picture", 20)
+    wait_until(lambda: pictures.open == 0, "nobody waits for a picture")
 
 
 def test_the_rig_view_has_cameras_and_processes_also_when_it_is_opened_first(

@@ -99,7 +99,7 @@ def test_one_tap_loops_the_take_off_in_slow_motion(panel: Panel, overlay: Path, 
     page.locator("#frame-loop").click()
     expect(page.locator("#frame-speed")).to_have_value("5")
     page.locator("#frame-speed").select_option("1")
-    wait_until(lambda: page.evaluate("seen.some((pulse, i) => pulse < seen[i - 1])"), "it goes round", 40)
+    wait_until(lambda: page.evaluate("seen.some((pulse, i) => pulse < seen[i - 1])"), "it goes round")
     page.locator("#frame-loop").click()
     expect(page.get_by_role("button", name="Play")).to_be_visible()
     seen = page.evaluate("seen")

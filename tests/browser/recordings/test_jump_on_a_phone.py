@@ -64,7 +64,7 @@ def _swipe_to(page: Page, right: float, camera: str) -> None:
         page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         return _camera(page).inner_text() != before
 
-    wait_until(swiped, "the swipe is taken", 30)
+    wait_until(swiped, "the swipe is taken")
     expect(_camera(page)).to_have_text([camera])
 
 
@@ -110,14 +110,14 @@ def test_a_finger_swipes_to_the_next_camera_and_moves_what_two_have_enlarged(
     plane = page.locator("#frames .plane")
     before = _box(plane)["x"]
     Fingers(page).swipe((x, y), -60)
-    wait_until(lambda: _box(plane)["x"] < before - 30, "the picture is moved", 20)
+    wait_until(lambda: _box(plane)["x"] < before - 30, "the picture is moved")
     expect(_camera(page)).to_have_text(["K2"])
     Fingers(page).drag(((x - 120, y), (x - 20, y)), ((x + 120, y), (x + 20, y)))
     expect(frames).not_to_have_class(re.compile("zoomed"))
     expect(_camera(page)).to_have_text(["K2"])
 
     Fingers(page).swipe(_middle(frames), 15, -150)
-    wait_until(lambda: page.evaluate("scrollY") > 50, "a finger that goes up scrolls the page", 20)
+    wait_until(lambda: page.evaluate("scrollY") > 50, "a finger that goes up scrolls the page")
     expect(_camera(page)).to_have_text(["K2"])
     shows(page, TAKEOFF)
 
@@ -130,7 +130,7 @@ def test_one_tap_loops_the_take_off_also_in_the_next_camera(panel: Panel, overla
     _swipe_to(page, -120, "K2")
     page.locator("#frame-speed").select_option("1")
     page.evaluate(WATCH)
-    wait_until(lambda: page.evaluate("seen.some((pulse, i) => pulse < seen[i - 1])"), "it goes round", 40)
+    wait_until(lambda: page.evaluate("seen.some((pulse, i) => pulse < seen[i - 1])"), "it goes round")
     seen = page.evaluate("seen")
     assert min(seen) == FIRST  # the log begins less than 0.5 s before the take-off
     assert max(seen) <= TAKEOFF + RATE_HZ
@@ -151,23 +151,23 @@ def test_the_jump_fills_the_screen_and_turns_with_the_phone(
     full.tap()
     expect(full).to_have_attribute("aria-pressed", "true")
     assert page.evaluate("document.fullscreenElement?.id") == (None if script else "player")
-    wait_until(lambda: _fills(page, UPRIGHT), "the player is as large as the screen", 20)
+    wait_until(lambda: _fills(page, UPRIGHT), "the player is as large as the screen")
     _in_reach(page)
     _swipe_to(page, -120, "K3")
 
     _turn(page, ACROSS)
-    wait_until(lambda: _fills(page, ACROSS), "it turns with the phone", 20)
+    wait_until(lambda: _fills(page, ACROSS), "it turns with the phone")
     expect(_camera(page)).to_have_text(["K3"])
     assert _box(page.locator("#frames"))["height"] > 0.65 * ACROSS[1]
     _in_reach(page)
     _swipe_to(page, 120, "K2")
 
     _turn(page, UPRIGHT)
-    wait_until(lambda: _fills(page, UPRIGHT), "it turns back", 20)
+    wait_until(lambda: _fills(page, UPRIGHT), "it turns back")
     expect(_camera(page)).to_have_text(["K2"])
     full.tap()
     expect(full).to_have_attribute("aria-pressed", "false")
-    wait_until(lambda: _box(player)["width"] == before["width"], "the player is as it was", 20)
+    wait_until(lambda: _box(player)["width"] == before["width"], "the player is as it was")
     assert_fits_a_phone(page)
 
 

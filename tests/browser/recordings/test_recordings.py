@@ -447,7 +447,7 @@ def test_a_note_is_spoken_listened_to_and_removed(
     sound.evaluate("audio => { void audio.play(); }")
     client.put("/api/recordings/jump/notes/3", json={"text": "somebody else's"}).raise_for_status()
     expect(page.locator("#notes li")).to_have_count(1)  # what others do does not end the listening
-    wait_until(lambda: sound.evaluate("audio => audio.currentTime") > 0.2, "it can be heard", 40)
+    wait_until(lambda: sound.evaluate("audio => audio.currentTime") > 0.2, "it can be heard")
     (note,) = service.voice_notes("jump")
     with av.open(str(service.catalogue.voice_notes("jump")[0].path)) as opened:
         assert opened.streams.audio[0].codec_context.name == "opus"

@@ -240,7 +240,7 @@ def test_a_board_held_before_the_cameras_calibrates_them(tmp_path: Path, loopbac
         wait_until(lambda: taken() >= 3, "it goes on", _PATIENCE_S, 0.2)
         before = service.get("/api/calibration")["taken"]
         page.get_by_role("button", name="Take the last one back").click()
-        wait_until(lambda: taken() == before - 1, "the last one is gone", 20, 0.02)
+        wait_until(lambda: taken() == before - 1, "the last one is gone", poll_s=0.02)
         wait_until(lambda: taken() >= 12, "there are enough", _PATIENCE_S, 0.2)
         expect(page.locator("#calibrating-missing li")).to_have_text([re.compile("has all it needs")])
         pictures = Path(service.get("/api/calibration")["folder"])

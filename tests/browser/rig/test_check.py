@@ -165,7 +165,9 @@ def test_another_region_is_used_and_kept_and_calibrations_that_do_not_fit_are_sa
     x.fill("8")
     use.click()
     expect(use).to_be_disabled()
-    wait_until(lambda: service.lights["K1"].region == Region(x=8, y=0, width=200, height=240), "it is used", 20, 0.05)
+    wait_until(
+        lambda: service.lights["K1"].region == Region(x=8, y=0, width=200, height=240), "it is used", poll_s=0.05
+    )
     expect(said).to_contain_text("Gjelder til tjenesten avsluttes")
     save.click()
     expect(save).to_be_disabled()

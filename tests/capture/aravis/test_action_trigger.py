@@ -155,7 +155,7 @@ def test_a_camera_without_reference_time_and_one_that_answers_nothing_are_told_b
                     told.extend(str(said) for said in sender.read())
                     return len(told) >= 2
 
-                wait_until(both_told, "both cameras are told of", 10)
+                wait_until(both_told, "both cameras are told of")
                 first, second = sender.counts
         finally:
             camera.close()
@@ -186,7 +186,7 @@ def test_commands_of_another_rig_expose_nothing(tmp_path: Path, loopback: Loopba
                     sender.read()
                     return sender.counts[0].unanswered >= 3
 
-                wait_until(ignored, "three commands were ignored", 10)
+                wait_until(ignored, "three commands were ignored")
                 assert sender.counts[0].acknowledged == 0
             assert camera.receive(0.0) is None
         finally:
@@ -204,7 +204,7 @@ def test_commands_that_cannot_be_sent_are_told() -> None:
             told.extend(str(each) for each in sender.read())
             return bool(told)
 
-        wait_until(said, "the failure is told", 10)
+        wait_until(said, "the failure is told")
     finally:
         sender.stop()
     assert told[0].startswith("action commands cannot be sent to ::1 (")

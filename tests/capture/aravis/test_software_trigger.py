@@ -133,7 +133,7 @@ def test_a_camera_that_was_not_told_to_expose_is_not_silent(tmp_path: Path, loop
     with _camera(rig) as ring, Station(opened, ring, commands) as station:
         station.await_records(FrameRecord, 1)
         ring.request_reconnect()
-        wait_until(lambda: commands.left < -100, "the grabber has looked for a frame for some time", 20)
+        wait_until(lambda: commands.left < -100, "the grabber has looked for a frame for some time")
         commands.left = 3
         station.await_records(FrameRecord, 2)
     assert {record.epoch for record in station.records} == {1}

@@ -28,7 +28,7 @@ def _delete(catalogue: Catalogue, name: str) -> int:
     taken = (log.stat().st_blocks + beside.stat().st_blocks) * 512
     before = time.time()
     catalogue.delete(name)
-    wait_until(lambda: _now(catalogue.directory) > before, "the file system's clock goes on", 5, 0.001)
+    wait_until(lambda: _now(catalogue.directory) > before, "the file system's clock goes on", poll_s=0.001)
     return taken
 
 

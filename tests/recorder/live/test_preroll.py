@@ -305,7 +305,7 @@ def test_events_of_a_recording_have_its_times_live_too(tmp_path: Path, publisher
         _recorder(tmp_path, publisher, seconds=1.0, limit=100) as recorder,
         subscriber(publisher.address, b"event") as sub,
     ):
-        wait_until(lambda: publisher._wanted(b"event"), "somebody has subscribed", timeout_s=30)
+        wait_until(lambda: publisher._wanted(b"event"), "somebody has subscribed")
         recorder.recordings.happened(Event.at(UtcNs(5), Level.INFO, "K1", plain("before it")))
         _expose(recorder, 1, 10)
         path = recorder.start(None)

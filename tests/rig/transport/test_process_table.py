@@ -110,7 +110,7 @@ def _receive(table: ProcessTable, count: int) -> list[tuple[str, EchoConfig]]:
         received.extend(table.receive(0.1))
         return len(received) >= count
 
-    wait_until(enough, f"{count} messages have come", 10)
+    wait_until(enough, f"{count} messages have come")
     return received
 
 

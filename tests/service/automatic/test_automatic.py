@@ -59,7 +59,7 @@ def test_jumpers_are_recorded_without_a_touch_and_marks_from_outside_too(tmp_pat
         assert _alarms(service) == [], "a recording has begun"
         assert first["recording"]["id"] == again["recording"]["id"]
         assert first["recording"]["session"]["bib"] == "99"
-        wait_until(lambda: len(_ended(service)) == len(before) + 1, "the marked jump is recorded", 20, 0.1)
+        wait_until(lambda: len(_ended(service)) == len(before) + 1, "the marked jump is recorded", poll_s=0.1)
         log = verify(service.data / f"{first['recording']['id']}.mcap")
         said = [event.message for event in log.events if event.name == "mark"]
         assert len(said) == 2

@@ -50,7 +50,7 @@ def test_a_folder_that_overrides_that_of_the_rig_file_is_said(tmp_path: Path, lo
     with rig.open("a") as file:
         file.write(f'[recorder]\ndirectory = "{tmp_path / "season"}"\n')
     with serving(tmp_path, rig, loopback) as service:
-        wait_until(lambda: bool(_told(service)), "it is said where recordings go", 10)
+        wait_until(lambda: bool(_told(service)), "it is said where recordings go")
         (line,) = _told(service)
         assert f"to {tmp_path / 'data'} as --data says, not to {tmp_path / 'season'} as {rig} says" in line
         assert service.state() == "idle"

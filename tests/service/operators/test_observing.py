@@ -6,6 +6,7 @@ from pathlib import Path
 
 import zmq
 
+from recorder.reading.info import info
 from recorder.reading.log_reader import LogReader
 from rig.events import Event
 from rig.settings.file import load_rig
@@ -54,8 +55,10 @@ def test_an_armed_service_can_be_watched(tmp_path: Path, loopback: Loopback) -> 
         assert {finding["topic"] for finding in examined["findings"]} >= {"software", "memory", "disk", "cameras"}
         assert any("disarm for that" in finding["what"] for finding in examined["findings"])
         saved = service.post("/api/recordings", {"duration_s": 0})
-        ended = service.post(f"/api/recordings/{saved['id']}/stop")
-        assert 55 <= ended["counts"]["pulses"] <= 66, "the two seconds that were held"
+        service.post(f"/api/recordings/{saved['id']}/stop")
+        # As the times of its pulses have it: a crowded machine makes fewer of them, and stops later.
+        held_s = info(service.data / f"{saved['id']}.mcap").ledger.duration_s
+        assert 55 <= 30 * held_s <= 66, "the two seconds that were held"
 
 
 def test_arming_and_starting_stand_in_the_log_and_on_zeromq(tmp_path: Path, loopback: Loopback) -> None:

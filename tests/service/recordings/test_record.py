@@ -188,7 +188,7 @@ def test_each_fault_is_recorded_with_its_cause(
 
 def test_ctrl_c_ends_the_recording_properly(tmp_path: Path, loopback: Loopback, fault_table: FaultTable) -> None:
     process = _record(write_rig(tmp_path, "sim", loopback), tmp_path / "logs", 60)
-    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    wait_until(_recording(tmp_path / "logs"), "recording")
     process.send_signal(signal.SIGINT)
     code, result, err = _result(process)
     assert code == 0, err
@@ -212,7 +212,7 @@ def test_a_terminal_that_is_closed_ends_the_recording_properly(
     with process.stdout:
         assert process.stderr.readline()
         process.stderr.close()
-        wait_until(_recording(tmp_path / "logs"), "recording", 20)
+        wait_until(_recording(tmp_path / "logs"), "recording")
         for _ in range(2):
             os.killpg(process.pid, signal.SIGHUP)
         result = json.loads(process.stdout.read())
@@ -232,7 +232,7 @@ def test_a_signal_to_all_processes_at_once_ends_the_recording_properly(
     process = subprocess.Popen(
         [*command, "--seconds", "60", "--out", str(tmp_path / "logs")], stdout=subprocess.PIPE, start_new_session=True
     )
-    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    wait_until(_recording(tmp_path / "logs"), "recording")
     process.send_signal(number)
     os.killpg(process.pid, number)
     result = json.loads(process.communicate(timeout=60)[0])
@@ -255,10 +255,10 @@ def test_a_killed_grabber_costs_its_own_frames_only(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable, backend: str
 ) -> None:
     process = _record(write_rig(tmp_path, backend, loopback), tmp_path / "logs", 120)
-    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    wait_until(_recording(tmp_path / "logs"), "recording")
     (log,) = (tmp_path / "logs").glob("*.mcap")
     os.kill(_children(process.pid)["K2"], signal.SIGKILL)
-    wait_until(lambda: "SIGKILL" in _said_of(log, "K2"), "the death is in the log", 30)
+    wait_until(lambda: "SIGKILL" in _said_of(log, "K2"), "the death is in the log")
     wait_until(lambda: "connected" in _said_of(log, "K2").partition("SIGKILL")[2], "K2 is back", 60)
     size = log.stat().st_size
     wait_until(lambda: log.stat().st_size > size + 60_000_000, "more is recorded", 60)
@@ -289,7 +289,7 @@ def test_a_killed_recorder_leaves_a_readable_log_and_no_process(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable
 ) -> None:
     process = _record(write_rig(tmp_path, "sim", loopback), tmp_path / "logs", 60)
-    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    wait_until(_recording(tmp_path / "logs"), "recording")
     os.kill(_children(process.pid)["recorder"], signal.SIGKILL)
     code, _, err = _result(process)
     assert code == 6
@@ -307,7 +307,7 @@ def test_a_killed_parent_leaves_a_finished_log_and_no_process(
     tmp_path: Path, loopback: Loopback, fault_table: FaultTable
 ) -> None:
     process = _record(write_rig(tmp_path, "aravis", loopback), tmp_path / "logs", 60)
-    wait_until(_recording(tmp_path / "logs"), "recording", 20)
+    wait_until(_recording(tmp_path / "logs"), "recording")
     children = _children(process.pid)
     process.kill()
     process.communicate(timeout=10)

@@ -24,7 +24,7 @@ def _seen(service: Serving, name: str) -> tuple[int, float]:
 
 def _settled(service: Serving, name: str = "hold_s") -> int:
     """Wait until the state is not new any more; returns its number."""
-    wait_until(lambda: _seen(service, name)[1] == 0, "the state is not new any more", 20)
+    wait_until(lambda: _seen(service, name)[1] == 0, "the state is not new any more")
     return _seen(service, name)[0]
 
 

@@ -148,7 +148,7 @@ def test_unplugging_that_the_scenario_plans(start_hill: StartHill, start_program
     hill = start_hill(toml='[[faults]]\nkind = "restart"\ncamera = "K1"\nat_pulse = 120\nduration_s = 0.3\n')
     assert hill.bus_state().nodes == ("fw0", "fw1")
     start_program(hill, "K1")
-    wait_until(lambda: hill.bus_state().nodes == ("fw0",), "unplugged", timeout_s=10)
+    wait_until(lambda: hill.bus_state().nodes == ("fw0",), "unplugged")
     wait_until(lambda: hill.bus_state().nodes == ("fw0", "fw1"), "plugged in again")
 
 

@@ -67,7 +67,7 @@ def test_the_stamps_stand_where_they_are_told_to(start_hill: StartHill, start_pr
     assert second["frame_count"] == first["frame_count"] + 1
     program("set_advanced", 0x610, 0x4200FFFF)
     # on a busy machine frames wait that were taken before
-    wait_until(lambda: program("frames", 1)[0]["frame_count"] < first["frame_count"], "frames are counted anew", 20)
+    wait_until(lambda: program("frames", 1)[0]["frame_count"] < first["frame_count"], "frames are counted anew")
 
 
 def test_a_reset_camera_has_its_defaults(start_hill: StartHill, start_program: StartProgram) -> None:

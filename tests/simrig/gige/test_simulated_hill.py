@@ -115,7 +115,7 @@ def test_a_restart_that_the_scenario_plans(loopback: Loopback, scenario_with: Ca
         pid = simulated.pids["K1"]
         receiver = Receiver(address)
         receiver.start()
-        wait_until(lambda: simulated.pids.get("K1") not in (pid, None), "another process is there", timeout_s=10.0)
+        wait_until(lambda: simulated.pids.get("K1") not in (pid, None), "another process is there")
         assert client.read(CCP) == 0
         pulses = [frame.pulse for frame in receiver.frames(30, timeout_s=0.1) if frame.status == "success"]
         assert max(pulses) < 310

@@ -44,7 +44,7 @@ def test_a_checksum_ends_when_its_client_has_left(service: MemoryService, endles
     with serving(service, Access("127.0.0.1")) as panel, panel.client() as client:
         with pytest.raises(httpx.ReadTimeout):
             client.get(SUM, timeout=0.3)
-        wait_until(lambda: bool(endless) and endless[0].closed, "the file is closed", 20)
+        wait_until(lambda: bool(endless) and endless[0].closed, "the file is closed")
 
 
 def test_a_checksum_does_not_keep_the_service_from_ending(service: MemoryService, endless: list[_Endless]) -> None:
@@ -57,7 +57,7 @@ def test_a_checksum_does_not_keep_the_service_from_ending(service: MemoryService
 
         asked = threading.Thread(target=ask)
         asked.start()
-        wait_until(lambda: bool(endless) and endless[0].reads > 0, "the file is read", 20)
+        wait_until(lambda: bool(endless) and endless[0].reads > 0, "the file is read")
     asked.join(20)
     assert not asked.is_alive()
     assert endless[0].closed

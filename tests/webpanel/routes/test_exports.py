@@ -98,9 +98,9 @@ def test_a_running_export_stands_still_for_a_recording_and_can_be_given_up(tmp_p
     job = exports.start("long", log, "long", ExportOrder(burn_in=True))
     wait_until(lambda: exports.job(job.id).done > 0, "the export is under way", 60)
     busy[0] = True
-    wait_until(lambda: exports.job(job.id).state is ExportState.PAUSED, "it stands still", 20)
+    wait_until(lambda: exports.job(job.id).state is ExportState.PAUSED, "it stands still")
     exports.remove(job.id)
-    wait_until(lambda: not (tmp_path / FOLDER / job.id).exists(), "it is given up", 20)
+    wait_until(lambda: not (tmp_path / FOLDER / job.id).exists(), "it is given up")
     exports.close()
 
 

@@ -101,7 +101,7 @@ def test_forty_clients_watch_and_still_command(panel: Panel, service: MemoryServ
         started = client.post("/api/recordings", json={}).json()
         assert all(each == (["armed", "recording"], 3) for each in watchers)
         assert client.post(f"/api/recordings/{started['id']}/stop").status_code == 200
-    wait_until(lambda: not panel.server.server_state.tasks, "nothing is left of them", 20)
+    wait_until(lambda: not panel.server.server_state.tasks, "nothing is left of them")
 
 
 def test_many_viewers_share_one_encoding(panel: Panel, service: MemoryService) -> None:

@@ -23,10 +23,10 @@ def test_computing_stands_still_while_a_recording_runs_and_can_be_cancelled(jump
     for click in clicks(desk, jump, 3, range(18, 21)):
         waiting.act("Anna", click.action())
     assert waiting.programs.compute("Anna").state == "computing"
-    wait_until(lambda: waiting.programs.computing.result("Anna").paused, "it stands still", 20)
+    wait_until(lambda: waiting.programs.computing.result("Anna").paused, "it stands still")
     child = _child()
     assert waiting.programs.computing.cancel("Anna") == HandResult(state="none")
-    wait_until(lambda: not Path(f"/proc/{child}").exists(), "the program has ended", 20)
+    wait_until(lambda: not Path(f"/proc/{child}").exists(), "the program has ended")
     assert waiting.programs.compute("Anna").state == "computing"
     waiting.close()
     assert [path.name for path in files.folder.iterdir()] == ["Anna.jsonl"]
@@ -36,9 +36,9 @@ def test_a_program_that_was_killed_is_told(jump: HillLog, desk: Desk) -> None:
     for click in clicks(desk, jump, 3, range(18, 21)):
         desk.act("Anna", click.action())
     desk.programs.compute("Anna")
-    wait_until(lambda: _child() is not None, "the program runs", 20)
+    wait_until(lambda: _child() is not None, "the program runs")
     os.kill(_child() or 0, signal.SIGKILL)
-    wait_until(lambda: desk.programs.computing.result("Anna").state == "failed", "it is told", 20)
+    wait_until(lambda: desk.programs.computing.result("Anna").state == "failed", "it is told")
     problem = desk.programs.computing.result("Anna").problem
     assert problem is not None
     assert problem.code == "errand_ended"
@@ -87,10 +87,10 @@ def test_curves_that_were_not_computed_are_told_and_asked_for_again_with_the_nex
     for click in some[:-1]:
         desk.act("Anna", click.action())
     desk.programs.curves("Anna")
-    wait_until(lambda: _child("curves_program") is not None, "the program runs", 20)
+    wait_until(lambda: _child("curves_program") is not None, "the program runs")
     assert os.sched_getscheduler(_child("curves_program") or 0) == os.SCHED_IDLE, "no click waits for it"
     os.kill(_child("curves_program") or 0, signal.SIGKILL)
-    wait_until(lambda: desk.programs.curves("Anna").state == "failed", "it is told", 20)
+    wait_until(lambda: desk.programs.curves("Anna").state == "failed", "it is told")
     assert _child("curves_program") is None
     desk.act("Anna", some[-1].action())
     assert _followed(desk).curves["alpha"]

@@ -22,13 +22,13 @@ def test_following_stands_still_while_a_recording_runs_and_cancelled_keeps_nothi
     before = waiting.session("Anna").everything()
     follower = waiting.programs.follower
     assert waiting.programs.follow("Anna", ORDER).state == "tracking"
-    wait_until(lambda: follower.state("Anna").paused, "it stands still", 20)
+    wait_until(lambda: follower.state("Anna").paused, "it stands still")
     assert waiting.programs.follow("Anna", ORDER.model_copy(update={"things": ["P3"]})).paused  # nothing else begins
     assert follower.cancel("Anna").state == "none"
     follower.wait("Anna", 20)
     assert waiting.session("Anna").everything() == before
     assert waiting.programs.follow("Anna", ORDER).state == "tracking"
-    wait_until(lambda: follower.state("Anna").paused, "it stands still again", 20)
+    wait_until(lambda: follower.state("Anna").paused, "it stands still again")
     recording = False
     wait_until(lambda: follower.state("Anna").share > 0.3, "it goes on, and says how far it is", PATIENCE_S)
     told = follower.wait("Anna", PATIENCE_S)

@@ -55,7 +55,7 @@ class Desk:
 
     def wait_for(self, revision: int) -> None:
         """Wait until so many acts are kept."""
-        wait_until(lambda: self.session()["revision"] == revision, f"{revision} acts are kept", 20)
+        wait_until(lambda: self.session()["revision"] == revision, f"{revision} acts are kept")
 
     def _get(self, path: str) -> dict[str, Any]:
         answer = self.client.get(path)

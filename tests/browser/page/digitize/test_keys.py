@@ -98,7 +98,7 @@ def test_a_jump_without_markers_is_measured_by_keys(desk: Desk, open_page: Open)
     assert placed < 60
     for camera in CAMERAS:
         for thing in POINTS:
-            wait_until(lambda: _off(desk, camera, thing) < 0.1, f"{thing} is where it is to be in {camera}", 20)  # noqa: B023 - called at once
+            wait_until(lambda: _off(desk, camera, thing) < 0.1, f"{thing} is where it is to be in {camera}")  # noqa: B023 - called at once
     for ski in ("left ski", "right ski"):
         _choose(page, "K1", ski)
         page.keyboard.press("e")

@@ -295,7 +295,7 @@ def test_the_pulse_before_stays_in_sight_as_a_ghost(desk: Desk, open_page: Open)
     at = screen(page, "K1", desk.true("K1", "P1"))
     settled(page)
     coloured = "the colour of the helmet's mark"  # the pulse before is fetched after the frame
-    wait_until(lambda: bool(np.ptp(seen(page, at, (12, 12)), axis=2).max() > 40), coloured, 20)
+    wait_until(lambda: bool(np.ptp(seen(page, at, (12, 12)), axis=2).max() > 40), coloured)
     page.keyboard.press("o")
     expect(page.locator("#view-ghost")).to_have_attribute("aria-pressed", "false")
     settled(page)
@@ -315,9 +315,9 @@ def test_what_was_measured_automatically_is_taken_over_by_one_key_and_never_redo
     expect(page.locator('[data-of="P1"]')).to_contain_text("controlled")  # it counts without a click
     page.locator("#advance").select_option("view")
     page.mouse.click(*screen(page, "K2", np.add(desk.true("K2", "P1"), (2, 0))))
-    wait_until(lambda: desk.session("Bo")["revision"] == 1, "his own click is kept", 20)
+    wait_until(lambda: desk.session("Bo")["revision"] == 1, "his own click is kept")
     page.keyboard.press("Shift+R")
-    wait_until(lambda: desk.session("Bo")["revision"] == 6, "the rest is taken over", 20)
+    wait_until(lambda: desk.session("Bo")["revision"] == 6, "the rest is taken over")
     marks = desk.view(operator="Bo")["marks"]
     sources = {(camera, thing): mark["source"] for camera, of in marks.items() for thing, mark in of.items()}
     assert sources.pop(("K2", "P1")) == "hand"
@@ -383,7 +383,7 @@ def _kept_line(desk: Desk, camera: str) -> dict[str, Any]:
             lines.append(line)
         return line is not None and len(line["vertices"]) == (5, 2)[line["vertices"][0]["source"] == "refined"]
 
-    wait_until(whole, f"the line in {camera} is kept", 20)
+    wait_until(whole, f"the line in {camera} is kept")
     return lines[-1]
 
 

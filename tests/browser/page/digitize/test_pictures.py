@@ -24,7 +24,7 @@ def _place(page: Page, desk: Desk, at: Floats) -> Floats:
     """Click, and take what was kept away again."""
     page.mouse.click(*at)
     expect(page.locator('[data-thing="P1"] .sign').first).to_have_attribute("data-letter", "m")
-    wait_until(lambda: desk.mark("K1", "P1") is not None, "the click is kept", 20)
+    wait_until(lambda: desk.mark("K1", "P1") is not None, "the click is kept")
     mark = desk.mark("K1", "P1")
     assert mark is not None
     page.keyboard.press("z")
@@ -143,7 +143,7 @@ def test_the_histogram_counts_the_frame_that_is_in_sight(desk: Desk, open_page: 
         frame = decoded(desk.client.get(f"/frames/{pulse}/{camera}.png").content)[..., 0]
         counts = np.bincount(frame.astype(int).ravel(), minlength=256)
         wanted = 64 * np.log1p(counts) / np.log1p(counts.max())
-        wait_until(lambda wanted=wanted: _fits(page, wanted), f"the histogram of {camera} at {pulse}", 20)  # type: ignore[misc]
+        wait_until(lambda wanted=wanted: _fits(page, wanted), f"the histogram of {camera} at {pulse}")  # type: ignore[misc]
 
 
 def _fits(page: Page, heights: Floats) -> bool:

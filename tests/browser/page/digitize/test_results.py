@@ -129,7 +129,7 @@ def test_a_jump_is_computed_goes_out_as_a_file_and_comes_back(desk: Desk, open_p
     )
     assert answer.status_code == 200
     page.locator("#import-file").set_input_files(kept)
-    wait_until(lambda: desk.view()["marks"] == before, "the marks are back", 20)
+    wait_until(lambda: desk.view()["marks"] == before, "the marks are back")
 
 
 def test_two_operators_are_compared_on_the_page(desk: Desk, open_page: Open) -> None:

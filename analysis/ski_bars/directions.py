@@ -266,16 +266,17 @@ class LineTable:
         Returns:
             Sums (...), and whether the lines were looked at (...).
         """
-        side = (self.sums.shape[1] - 1) // 2
-        line = np.rint(u / (_STEP_M * self.scale)).astype(int) + side
-        inside: Flags = (line >= 1) & (line < self.sums.shape[1] - 1)
-        line = np.clip(line, 1, self.sums.shape[1] - 2)
+        beside, samples = self.sums.shape[1:]
+        line = np.rint(u / (_STEP_M * self.scale)).astype(int) + (beside - 1) // 2
+        inside: Flags = (line >= 1) & (line < beside - 1)
+        row = (turn * beside + np.clip(line, 1, beside - 2)) * samples
         begin, end = (
-            np.clip(np.rint((r / self.scale - _REACH_M[0]) / _ALONG_M).astype(int), 0, self.sums.shape[2] - 1)
+            row + np.clip(np.rint((r / self.scale - _REACH_M[0]) / _ALONG_M).astype(int), 0, samples - 1)
             for r in (first, last)
         )
-        near = [self.sums[turn, line + i, end] - self.sums[turn, line + i, begin] for i in (-1, 0, 1)]
-        return np.max(near, axis=0), inside
+        flat = self.sums.ravel()  # by one number a place is found faster than by three
+        one, middle, other = (flat.take(end + i) - flat.take(begin + i) for i in (-samples, 0, samples))
+        return np.maximum(np.maximum(one, middle), other), inside
 
 
 def line_table(

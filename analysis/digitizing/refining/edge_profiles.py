@@ -145,41 +145,54 @@ def _fitted(pixels: Strip, ends: Floats, noise: float) -> Borders | None:
     if near.there.sum() < 2 * _FEWEST:
         return None
     theta = np.append(ends.ravel(), np.log(_BLUR))
-    weight = np.ones(len(near.t))
-    damping, now = 1e-3, _equations(near, theta, weight, noise)
+    weight, damping = np.ones(len(near.t)), 1e-3
+    seen = _seen(near, theta, noise)
+    cost, equations = _cost(theta, seen, weight), _equations(near, theta, seen, weight, noise)
     for _ in range(_STEPS):
-        normal = now.normal.copy()
+        normal = equations[0].copy()
         normal.flat[:: len(normal) + 1] *= 1 + damping
-        step = np.clip(np.linalg.solve(normal, now.gradient), -_LARGEST_STEP, _LARGEST_STEP)
+        step = np.clip(np.linalg.solve(normal, equations[1]), -_LARGEST_STEP, _LARGEST_STEP)
         trial = theta + step
         trial[-1] = np.clip(trial[-1], *_BLURS)
-        new = _equations(near, trial, weight, noise)
-        if new.cost <= now.cost:
-            theta, damping = trial, damping / 5
-            weight = _weights(new)
-            now = _equations(near, theta, weight, noise)
+        new = _seen(near, trial, noise)
+        if _cost(trial, new, weight) <= cost:
+            theta, seen, damping = trial, new, damping / 5
+            weight = _weights(seen)
+            cost, equations = _cost(theta, seen, weight), _equations(near, theta, seen, weight, noise)
             if np.abs(step[:-1]).max() < _ENOUGH:
                 break
         else:
             damping *= 10
             if damping > 1e8:
                 break
-    return _judged(near, theta, ends, now, weight, noise)
+    return _judged(near, theta, ends, seen, equations[0], weight, noise)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Equations:
-    cost: float
+class _Seen:
+    """What borders leave unexplained.
+
+    Attributes:
+        z: (b, s, p) distances from the borders over the blur.
+        columns: (s, p, b + 1) shares of the grey values of a section.
+        normal: (s, b + 1, b + 1) equations of these.
+        linear: (s, b + 1) grey values.
+        off: (s, p) residuals.
+        squares: (s,) of them, over the noise.
+        counts: (s,) pixels.
+    """
+
+    z: Floats
+    columns: Floats
     normal: Floats
-    gradient: Floats
-    squares: Floats  # (s,) over the noise
-    counts: Floats  # (s,)
-    linear: Floats  # (s, b + 1) grey values
-    variance: Floats  # (s, b + 1) of them, for noise 1
+    linear: Floats
+    off: Floats
+    squares: Floats
+    counts: Floats
 
 
-def _equations(pixels: Strip, theta: Floats, weight: Floats, noise: float) -> _Equations:
-    """Normal equations of the geometry, the grey values of each section eliminated."""
+def _seen(pixels: Strip, theta: Floats, noise: float) -> _Seen:
+    """Borders with the grey values that fit best, section by section."""
     borders = (len(theta) - 1) // 2
     ends, blur = theta[:-1].reshape(borders, 2), np.exp(theta[-1])
     line = ends[:, 0, None, None] + (ends[:, 1] - ends[:, 0])[:, None, None] * pixels.t
@@ -188,29 +201,36 @@ def _equations(pixels: Strip, theta: Floats, weight: Floats, noise: float) -> _E
     columns = shape.transpose(1, 2, 0)
     normal = columns.transpose(0, 2, 1) @ columns + 1e-6 * np.eye(borders + 1)
     linear = np.linalg.solve(normal, columns.transpose(0, 2, 1) @ pixels.grey[..., None])
-    v = pixels.grey * pixels.there - (columns @ linear)[..., 0]
-    density = np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi) * pixels.there * linear[:, 1:, 0].T[..., None]
-    by_line = -density / blur
+    off = pixels.grey * pixels.there - (columns @ linear)[..., 0]
+    counts = np.asarray(pixels.there.sum(axis=1), float)
+    grey = np.asarray(linear[..., 0], float)
+    return _Seen(z, columns, normal, grey, off, (off**2).sum(axis=1) / noise**2, counts)
+
+
+def _cost(theta: Floats, seen: _Seen, weight: Floats) -> float:
+    return float(weight @ seen.squares) + _BLUR_SPREAD**-2 * float(np.log(_BLUR) - theta[-1]) ** 2
+
+
+def _equations(pixels: Strip, theta: Floats, seen: _Seen, weight: Floats, noise: float) -> tuple[Floats, Floats]:
+    """Normal equations of the geometry and their right side, the grey values of each section eliminated."""
+    z, columns = seen.z, seen.columns
+    density = np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi) * pixels.there * seen.linear[:, 1:].T[..., None]
+    by_line = -density / np.exp(theta[-1])
     rows = [part * factor for part in by_line for factor in (1 - pixels.t, pixels.t)]
     rows.append(-(density * z).sum(axis=0))
     design = np.stack(rows, axis=-1)  # (s, p, 2 b + 1)
-    design = design - columns @ np.linalg.solve(normal, columns.transpose(0, 2, 1) @ design)
+    design = design - columns @ np.linalg.solve(seen.normal, columns.transpose(0, 2, 1) @ design)
     w = weight / noise**2
-    squares = (v**2).sum(axis=1) / noise**2
     prior = np.zeros(len(theta))
     prior[-1] = _BLUR_SPREAD**-2
-    off = np.log(_BLUR) - theta[-1]
     weighed = (design * w[:, None, None]).reshape(-1, len(theta)).T
     full = weighed @ design.reshape(-1, len(theta)) + np.diag(prior + 1e-9)
-    gradient = weighed @ v.ravel()
-    gradient[-1] += prior[-1] * off
-    cost = float(weight @ squares) + prior[-1] * off**2
-    counts = np.asarray(pixels.there.sum(axis=1), float)
-    variance = np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2)
-    return _Equations(cost, full, gradient, squares, counts, np.asarray(linear[..., 0], float), variance)
+    gradient = weighed @ seen.off.ravel()
+    gradient[-1] += prior[-1] * (np.log(_BLUR) - theta[-1])
+    return full, gradient
 
 
-def _weights(now: _Equations) -> Floats:
+def _weights(now: _Seen) -> Floats:
     """Weights of the sections (Cauchy), against the usual one."""
     free = np.maximum(now.counts - now.linear.shape[1], 1)
     misfit = np.sqrt(now.squares / free)
@@ -218,7 +238,7 @@ def _weights(now: _Equations) -> Floats:
 
 
 def _judged(
-    pixels: Strip, theta: Floats, start: Floats, now: _Equations, weight: Floats, noise: float
+    pixels: Strip, theta: Floats, start: Floats, now: _Seen, normal: Floats, weight: Floats, noise: float
 ) -> Borders | None:
     ends = theta[:-1].reshape(-1, 2)
     if np.abs(ends - start).max() > REACH_PX or (np.diff(ends, axis=0) < _THINNEST).any():
@@ -232,8 +252,9 @@ def _judged(
     level = (pixels.grey * pixels.there).sum(axis=1) / pixels.there.sum(axis=1)
     without = float(weight @ (((pixels.grey - level[:, None]) * pixels.there) ** 2).sum(axis=1)) / noise**2
     step = np.sqrt((weight @ now.linear[:, 1:] ** 2) / weight.sum())
-    evidence = weight @ (now.linear[:, 1:] ** 2 / now.variance[:, 1:]) / (noise**2 * factor)
-    covariance = np.asarray(np.linalg.inv(now.normal)[:-1, :-1] * factor, float)
+    variance = np.diagonal(np.linalg.inv(now.normal), axis1=1, axis2=2)  # of the grey values, for noise 1
+    evidence = weight @ (now.linear[:, 1:] ** 2 / variance[:, 1:]) / (noise**2 * factor)
+    covariance = np.asarray(np.linalg.inv(normal)[:-1, :-1] * factor, float)
     explained, unknowns = (without - square) / factor, len(theta) + len(ends) * len(weight)
     blur, sections = float(np.exp(theta[-1])), len(weight)
     return Borders(ends, covariance, blur, step, evidence, sections, square, redundancy, explained, unknowns)

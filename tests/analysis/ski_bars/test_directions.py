@@ -9,12 +9,13 @@ from analysis.ski_bars.directions import Directions, seek_directions
 from rig.arrays import Floats
 from tests.analysis.digitizing.following.tracked_hill import RATE_HZ, TrackedHill, hill
 from tests.analysis.ski_bars.hill_views import views_of
+from tests.support.repeats import repeats
 
 BINDING_M = 0.01
 AXES = np.diag((1.0, 1.0, 1.0))  # the hill's X axis leads forward
 
 
-@pytest.fixture(scope="module", params=[21, 24, 27, 30])
+@pytest.fixture(scope="module", params=repeats([21, 24, 27, 30]))
 def of(request: pytest.FixtureRequest) -> TrackedHill:
     return hill(request.param)
 

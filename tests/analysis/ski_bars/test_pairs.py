@@ -7,6 +7,7 @@ from analysis.identification.space.body import BINDINGS, usual_difference
 from analysis.ski_bars.pairs import Feet, Pairs, seek_pairs
 from tests.analysis.digitizing.following.tracked_hill import RATE_HZ, TrackedHill, hill
 from tests.analysis.ski_bars.hill_views import views_of
+from tests.support.repeats import repeats
 
 AXES = np.eye(3)  # the hill's X axis leads forward
 FEET_M = np.array((0.25, 0.15, 0.15))  #: standard deviations of where helmet and hip tell the feet
@@ -24,7 +25,9 @@ def _sought(of: TrackedHill, pulses: list[int], off_m: np.ndarray, *, empty: boo
     return seek_pairs(views, Feet(feet, covariance, apart, sigma), np.array(pulses) / RATE_HZ, AXES)
 
 
-@pytest.mark.parametrize(("seed", "off_m"), [(21, (0.2, -0.1, 0.2)), (24, (-0.3, 0.1, 0.1)), (27, (0.1, 0.2, -0.25))])
+@pytest.mark.parametrize(
+    ("seed", "off_m"), repeats([(21, (0.2, -0.1, 0.2)), (24, (-0.3, 0.1, 0.1)), (27, (0.1, 0.2, -0.25))])
+)
 def test_both_skis_are_found_from_about_where_the_feet_are(seed: int, off_m: tuple[float, float, float]) -> None:
     of = hill(seed)
     pulses = of.in_sight("P3")[::3]
@@ -40,6 +43,6 @@ def test_both_skis_are_found_from_about_where_the_feet_are(seed: int, off_m: tup
 
 def test_where_nobody_jumps_less_speaks_for_skis() -> None:
     of = hill(21)
-    pulses = of.in_sight("P3")[::4]
+    pulses = of.in_sight("P3")[::8]
     there, empty = (_sought(of, pulses, np.zeros(3), empty=nobody).gain.sum(axis=1) for nobody in (False, True))
     assert np.median(there) > 2 * np.median(empty)

@@ -82,7 +82,7 @@ def test_balls_are_named_without_any_start_value(seed: int) -> None:
     _check(_sight(seed))
 
 
-@pytest.mark.parametrize("seed", repeats(range(8), quick=2))
+@pytest.mark.parametrize("seed", repeats(range(8)))
 def test_balls_are_named_in_an_image_of_a_small_part_of_the_hill(seed: int) -> None:
     """Hardly any triple of surveyed balls lies in it."""
     seeds = (seed for seed in range(100 * seed, 100 * seed + 100))

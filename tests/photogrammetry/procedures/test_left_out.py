@@ -69,7 +69,7 @@ def _far(case: Synthetic, distance: float) -> Floats:
     return np.asarray(from_here + distance * (_MIDDLE - from_here) / np.linalg.norm(_MIDDLE - from_here))
 
 
-@pytest.mark.parametrize("images", [(0, 1), (0, 1, 2)])
+@pytest.mark.parametrize("images", repeats([((0, 1),), ((0, 1, 2),)]))
 @pytest.mark.parametrize(
     ("distance", "words"),
     [(1e6, "rays parallel within their accuracy"), (-300.0, "rays (parallel|meet behind a camera)")],

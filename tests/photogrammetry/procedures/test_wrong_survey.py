@@ -23,6 +23,7 @@ from photogrammetry.network.file_writer import write_network
 from photogrammetry.procedures.orientation import Orientation, orient
 from photogrammetry.procedures.stages import snoop_network
 from svev.cli import main
+from tests.support.repeats import repeats
 
 
 def _spoilt(spoil: Spoil, seed: int, *, poses: bool = False) -> Hill:
@@ -44,7 +45,7 @@ def _off(case: Hill, orientation: Orientation) -> float:
 
 
 @pytest.mark.parametrize("pairs", [1, 2])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", repeats(range(3)))
 def test_exchanged_names_are_told_and_only_they_are_taken_out(pairs: int, seed: int) -> None:
     case = _spoilt(exchanged_names(pairs), seed)
     orientation = orient(case.network)

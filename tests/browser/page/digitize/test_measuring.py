@@ -12,6 +12,7 @@ from tests.analysis.simulated import SIZE
 from tests.browser.conftest import Open
 from tests.browser.page.digitize.conftest import OPERATOR, PULSE, Desk, canvas_of, enter, screen, seen, settled
 from tests.browser.touch import Fingers
+from tests.support.repeats import repeats
 from tests.support.waiting import wait_until
 
 #: The pulse in which a ski is drawn: no image shows the other one over it. Where that lies, what is seen of a ski is
@@ -142,7 +143,9 @@ def test_a_jump_measured_with_keys_alone(desk: Desk, open_page: Open) -> None:
     page.keyboard.press("p")
 
 
-@pytest.mark.parametrize(("size", "enlarged"), [((360, 780), "1.6"), ((820, 1100), "3.7")], ids=["phone", "tablet"])
+@pytest.mark.parametrize(
+    ("size", "enlarged"), repeats([((360, 780), "1.6"), ((820, 1100), "3.7")]), ids=["phone", "tablet"]
+)
 def test_a_finger_places_where_the_loupe_shows_and_two_fingers_enlarge(
     desk: Desk, open_page: Open, size: tuple[int, int], enlarged: str
 ) -> None:

@@ -183,7 +183,7 @@ def test_the_difference_is_that_to_what_is_always_there(desk: Desk, open_page: O
     assert abs(seen(page, corner, (20, 20)).mean() - 128) < 4, "grey where nothing differs"
 
 
-@pytest.mark.parametrize("enlarged", [8, 16, 32])
+@pytest.mark.parametrize("enlarged", repeats([8, 16, 32]))
 def test_the_loupe_shows_what_is_under_the_pointer_and_does_not_cover_it(
     desk: Desk, open_page: Open, enlarged: int
 ) -> None:

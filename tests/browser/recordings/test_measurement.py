@@ -105,7 +105,7 @@ def test_progress_from_order_to_failure_without_loading_anew(
     _state(page, "Waits while a recording runs.")
 
     keep_problem(log, Statement(level=Level.WARNING, code="", text="hill.json: has no balls", advice="Survey them"))
-    service.measurings._running = None
+    service.measurings._now.running = None
     service.give_up_measuring("jump-1")
     _state(page, "Could not be measured.")
     expect(page.locator("#measurement-problem .mark")).to_have_text("hill.json: has no balls")
@@ -116,7 +116,7 @@ def test_progress_from_order_to_failure_without_loading_anew(
 
 def _measuring(service: MemoryService, now: MeasuringQueue) -> None:
     """Let this be measured, as the status and the recording say."""
-    service.measurings._running = now
+    service.measurings._now.running = now
     service._wake()
 
 
@@ -169,7 +169,7 @@ def test_each_step_after_a_recording_is_shown_with_its_state(
     log = service.catalogue.file("jump-2")
     missing = Statement(level=Level.WARNING, code="storage", text="/backup: the folder for copies is not there")
     keep_step(log, AfterStep.VIDEO, None)
-    service.measurings._copies.notes.note(log, "", missing)
+    service.measurings._queues.copies.notes.note(log, "", missing)
     page = open_page(f"{panel.url}/#/recordings/jump-2")
     steps = page.locator("#measurement-steps li")
     expect(steps).to_have_text(["Measured: done", "Video: done", re.compile("^Copy: failed.*/backup: the folder")])
@@ -204,14 +204,16 @@ def test_the_live_view_says_whose_jump_was_last_how_it_was_and_how_many_wait(
     expect(card).to_be_hidden()
     started = service.start_recording(RecordingOrder(bib="17", athlete="Anna Berg", preroll_s=0))
     service.stop_recording(started.id)
-    service.measurings._waiting.add(started.id)
-    service.measurings._running = MeasuringQueue(recording=started.id, state=MeasuringState.MEASURING, waiting=2)
-    service.measuring = service.measurings._running
+    service.measurings._queues.measuring.add(started.id)
+    service.measurings._now.running = MeasuringQueue(recording=started.id, state=MeasuringState.MEASURING, waiting=2)
+    service.measuring = service.measurings._now.running
     service._wake()
     expect(jumper).to_have_text("17 · Anna Berg")
     expect(page.locator("#measured-far")).to_have_text("Still measuring")
     expect(queue).to_have_text("measuring 1, waiting 2")
-    service.measuring = service.measurings._running.model_copy(update={"step": MeasuringStep.COPYING, "paused": True})
+    service.measuring = service.measurings._now.running.model_copy(
+        update={"step": MeasuringStep.COPYING, "paused": True}
+    )
     service._wake()
     expect(queue).to_have_text("copying 1 (waits while a recording runs), waiting 2")
     for hidden in ("#measured-figures", "#measured-verdict", "#measured-why"):
@@ -229,8 +231,8 @@ def test_the_live_view_says_whose_jump_was_last_how_it_was_and_how_many_wait(
     expect(page.locator("#measured-verdict")).to_have_text("Measured live")
     expect(page.locator("#measured-why")).to_have_text("all points in 18 of 18 pulses in sight")
     expect(page.locator("#measured-figures")).to_be_visible()
-    service.measurings._waiting.remove(started.id)
-    service.measuring, service.measurings._running = None, None
+    service.measurings._queues.measuring.remove(started.id)
+    service.measuring, service.measurings._now.running = None, None
     service._wake()
     expect(queue).to_be_hidden()
     jumper.click()

@@ -398,8 +398,9 @@ def test_recordings_are_copied_where_nothing_is_measured_and_again_when_they_cha
 def test_a_copy_gives_way_to_a_log_that_waits_to_be_measured(bench: Bench, tmp_path: Path) -> None:
     bench.copied_to = tmp_path
     queue = bench.queue()
-    queue._copies.want("old")
-    with queue._at_work("old", queue._copies.waiting):
+    copies = queue._queues.copies
+    copies.want("old")
+    with queue._now.on("old", copies.waiting):
         assert queue._wanted("old")
         queue.want("jump", bench.log("jump"))
         assert not queue._wanted("old")

@@ -11,7 +11,7 @@ and pulses at which the camera was gone or silent (by the log's events) or its c
 
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -22,9 +22,10 @@ from rig.health import Health
 from rig.pulse import PulseNumber
 from rig.tag import TripletTag
 from rig.transport.recorder_reports import CameraNews
+from triggering.ledger.arrivals import FRAMES, RHYTHM, WITNESSES, Arrivals, Change, Delay
 from triggering.ledger.recounted import Difference, Recounted
 from triggering.ledger.source_recount import SourceRecount
-from triggering.ledger.stretches import FRAMES, Run, shifts, stretches
+from triggering.ledger.stretches import Run, shift_of, shifts, stretches
 from triggering.ledger.tagged_frames import TaggedFrame, frame_of, goes_on, id_step, is_of_another_pulse, recomputed
 
 #: News after which numbers and clock of a camera prove nothing about the frames before it.
@@ -58,6 +59,21 @@ class _Gap:
 
 
 @dataclass(slots=True)
+class _Elsewhere:
+    """The stretch of frames of other pulses, by their clock, that goes on.
+
+    Attributes:
+        difference: what is to be said of it.
+        run: arrivals of its frames.
+        frames: how many there are.
+    """
+
+    difference: Difference
+    run: Run
+    frames: int = 0
+
+
+@dataclass(slots=True)
 class _Camera:
     """State of one camera."""
 
@@ -68,33 +84,28 @@ class _Camera:
     between: list[tuple[PulseNumber, FrameStatus]] = field(default_factory=list)
     gaps: list[_Gap] = field(default_factory=list)
     runs: list[Run] = field(default_factory=list)
-    elsewhere: Difference | None = None  #: the stretch of frames of other pulses, by their clock, that goes on
+    heard: Run = field(default_factory=lambda: Run(PulseNumber(0), PulseNumber(0), 0, 0, 0))  #: all frames
+    elsewhere: _Elsewhere | None = None
     breaks: list[UtcNs] = field(default_factory=list)
+    arrivals: Arrivals = field(default_factory=Arrivals)
     soonest: int | None = None  #: time from a pulse to the arrival of its frame, ns
     latest: int = 0
 
     def arrived(self, frame: TaggedFrame) -> None:
         """Note how long after its pulse a frame came."""
-        late = frame.host - frame.time
-        self.soonest = late if self.soonest is None else min(self.soonest, late)
-        self.latest = max(self.latest, late)
+        self.soonest = frame.late if self.soonest is None else min(self.soonest, frame.late)
+        self.latest = max(self.latest, frame.late)
 
     @property
     def scatter(self) -> int:
         """By how much the arrivals of its frames vary, ns."""
         return 0 if self.soonest is None else self.latest - self.soonest
 
-    def comes_back(self, last: TaggedFrame, frame: TaggedFrame, nearest: int) -> bool:
-        """Whether the last frame is the one that is filed under a wrong pulse, as its arrival says.
-
-        It came otherwise than the first frames of the log, which are taken to be right, and this one came as they did.
-        """
-        first = self.runs[0]
-        if first.frames < FRAMES:
-            return False
-        usual = first.late / first.frames
-        last_off, off = (abs(each.host - each.time - usual) for each in (last, frame))
-        return off < nearest / 2 < last_off
+    def off(self, frame: TaggedFrame) -> float | None:
+        """By how much its clock went on more than the pulses from its last frame to this one, ns; None: no last one."""
+        if self.last is None:
+            return None
+        return (frame.device - self.last.device) / self.gain() - (frame.time - self.last.time)
 
     def gain(self) -> float:
         """How much faster than the pulses' clock the camera's runs, as a factor."""
@@ -115,6 +126,7 @@ class Recount:
         self._differences: list[Difference] = []
         self._disagreements = self._unproven = 0
         self._source = SourceRecount()
+        self._delay = Delay()
 
     def add(self, tag: TripletTag) -> None:
         """Take the next tag; one that comes twice or too late is left out."""
@@ -154,7 +166,8 @@ class Recount:
                     self._judge(camera, gap)
             for stretch in stretches(camera.runs, shifts(camera.runs)):
                 late = f"{abs(stretch.later) / 1e6:.1f} ms {'later' if stretch.by > 0 else 'sooner'}"
-                why = f"its frame numbers jump against the pulses, and its frames come {late} after them than before"
+                shown = "its frame numbers jump against the pulses, and" if stretch.jumps else "unlike those of others,"
+                why = f"{shown} its frames come {late} after them than before"
                 ok = FrameStatus.OK
                 self._differs(Difference(stretch.first, camera.name, ok, None, why, stretch.last, stretch.by))
         self._differences.sort(key=lambda each: each.pulse)
@@ -170,47 +183,60 @@ class Recount:
         self._pulses += 1
         times = [other.time for other in (self._earlier, later) if other is not None]
         apart = [abs(tag.time - time) for time in times] or [NS_PER_S]
+        frames = {part.name: frame_of(tag, part) for part in tag.cameras if part.status is FrameStatus.OK}
+        heard = self._heard([(self._camera(name), frame) for name, frame in frames.items() if frame], apart)
         for part in tag.cameras:
             camera = self._camera(part.name)
             if part.status is not FrameStatus.OK:
                 camera.between.append((tag.pulse, part.status))
-            elif (frame := frame_of(tag, part)) is not None:
-                self._whole(camera, frame, min(apart), max(apart))
+            elif (frame := frames[part.name]) is not None:
+                self._whole(camera, frame, apart, heard)
             else:  # a tag that names no number or time: nothing can be proved across it
                 camera.states[FrameStatus.OK] += 1
                 camera.gaps.append(_Gap(camera.last, None, tuple(camera.between), cut=True))
                 camera.between.clear()
                 camera.last = None
 
-    def _whole(self, camera: _Camera, frame: TaggedFrame, nearest: int, farther: int) -> None:
-        """Take a whole frame; `nearest` and `farther` are the times from its pulse to those beside it, ns."""
-        last = camera.last
-        if last is None:
-            cut, camera.first = True, frame
-        else:
-            by_clock = (frame.device - last.device) / camera.gain()
-            off = by_clock - (frame.time - last.time)
-            cut = abs(off) >= nearest / 2
-            if cut and (frames := _slept_through(camera, last, frame, off)):
-                why = f"{frames} frames that its numbers tell of came while this computer's clock stood still"
-                self._differs(Difference(last.pulse, camera.name, FrameStatus.OK, None, why))
-            elif (
-                cut
-                and not camera.comes_back(last, frame, nearest)
-                and is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between)
-            ):
-                why = f"clock and number say that it was triggered {abs(off) / 1e6:.1f} ms "
-                why += "after this pulse" if off > 0 else "before this pulse"
-                self._is_elsewhere(camera, frame.pulse, why, round(off / nearest))
-                return
-        self._end_elsewhere(camera)
+    def _heard(self, frames: Sequence[tuple[_Camera, TaggedFrame]], apart: Sequence[int]) -> tuple[bool, bool]:
+        """Whether the arrivals of the frames of a pulse say something, and whether they bear witness to each other.
+
+        Args:
+            frames: with their cameras.
+            apart: times to the pulses beside it, ns.
+        """
+        excesses = [camera.arrivals.excess(frame.late - self._delay.offset) for camera, frame in frames]
+        known = [each for each in excesses if each is not None]
+        rhythm = max(apart) < RHYTHM * min(apart)
+        return rhythm and not self._delay.hides(known, min(apart)), len(known) >= WITNESSES
+
+    def _whole(self, camera: _Camera, frame: TaggedFrame, apart: Sequence[int], heard: tuple[bool, bool]) -> None:
+        """Take a whole frame.
+
+        Args:
+            camera: whose it is.
+            frame: the frame.
+            apart: times from its pulse to those beside it, ns.
+            heard: its arrival says something, and those of other cameras bear witness.
+        """
+        late = frame.late - self._delay.offset if heard[0] else None
+        tells = heard[1] or not camera.arrivals.known
+        change = camera.arrivals.take(late, min(apart)) if late is not None and tells else None
+        last, off = camera.last, camera.off(frame)
+        cut = off is None or abs(off) >= min(apart) / 2
+        if off is not None and cut and self._is_elsewhere(camera, frame, off, late if tells else None, apart):
+            return
+        self._end_elsewhere(camera, off if off is not None and not camera.arrivals.shifted else 0.0, min(apart))
         camera.arrived(frame)
         camera.states[FrameStatus.OK] += 1
         steps = 0 if last is None else frame.pulse - last.pulse
         excess = 0 if last is None or cut else id_step(last.frame_id, frame.frame_id) - steps
-        if last is None or cut or excess or camera.between:
-            camera.runs.append(Run(frame.pulse, frame.pulse, excess, nearest, farther))
-        camera.runs[-1].take(frame.pulse, frame.host - frame.time, nearest, farther)
+        if cut or excess or camera.between or change is not None:
+            anew, behind = change is Change.LATENCY, bool(camera.between)
+            camera.runs.append(Run(frame.pulse, frame.pulse, excess, min(apart), max(apart), anew, behind))
+        for run in (camera.runs[-1], camera.heard):
+            run.take(frame.pulse, late, min(apart), max(apart))
+        if late is not None and heard[1] and camera.arrivals.clear:
+            camera.runs[-1].came_at(camera.arrivals.level)
         if cut or camera.between or not goes_on(last, frame, steps):
             camera.gaps.append(_Gap(last, frame, tuple(camera.between), cut, camera.runs[-1]))
             camera.between.clear()
@@ -254,19 +280,64 @@ class Recount:
         self._unproven += len(gap.tagged)
         camera.states.update(status for _, status in gap.tagged)
 
-    def _is_elsewhere(self, camera: _Camera, pulse: PulseNumber, why: str, by: int) -> None:
-        """Note a frame that belongs to another pulse by its clock; consecutive ones are one stretch."""
-        earlier = camera.elsewhere
-        if earlier is not None and earlier.by == by:
-            camera.elsewhere = replace(earlier, last=pulse)
-            return
-        self._end_elsewhere(camera)
-        camera.elsewhere = Difference(pulse, camera.name, FrameStatus.OK, None, why, pulse, by)
+    def _is_elsewhere(
+        self, camera: _Camera, frame: TaggedFrame, off: float, late: float | None, apart: Sequence[int]
+    ) -> bool:
+        """Whether a frame belongs to another pulse by its clock and number; consecutive ones are one stretch.
 
-    def _end_elsewhere(self, camera: _Camera) -> None:
-        if camera.elsewhere is not None:
-            self._differs(camera.elsewhere)
-            camera.elsewhere = None
+        It does not if it came as usual after its pulse: those before it are filed wrongly. Where arrivals scatter, it
+        takes several frames to show that.
+
+        Args:
+            camera: whose it is.
+            frame: the frame.
+            off: by how much its clock went on more than the pulses, ns.
+            late: time from the pulse to its arrival, ns; None: that says nothing.
+            apart: times from the pulse to those beside it, ns.
+        """
+        last, nearest = camera.last, min(apart)
+        if last is None:
+            return False
+        if frames := _slept_through(camera, last, frame, off):
+            why = f"{frames} frames that its numbers tell of came while this computer's clock stood still"
+            self._differs(Difference(last.pulse, camera.name, FrameStatus.OK, None, why))
+            return False
+        by_clock = off + (frame.time - last.time)
+        if not is_of_another_pulse(last, frame, by_clock, nearest, certain=not camera.between):
+            return False
+        if late is not None and camera.arrivals.certain and not camera.arrivals.level:
+            return False
+        by = round(off / nearest)
+        if camera.elsewhere is None or camera.elsewhere.difference.by != by:
+            self._end_elsewhere(camera)
+            why = f"clock and number say that it was triggered {abs(off) / 1e6:.1f} ms "
+            why += "after this pulse" if off > 0 else "before this pulse"
+            found = Difference(frame.pulse, camera.name, FrameStatus.OK, None, why, frame.pulse, by)
+            camera.elsewhere = _Elsewhere(found, Run(frame.pulse, frame.pulse, 0, nearest, max(apart)))
+        elsewhere = camera.elsewhere
+        elsewhere.run.take(frame.pulse, late, nearest, max(apart))
+        if camera.heard.frames >= FRAMES and shift_of(camera.heard, elsewhere.run) == 0:
+            return False
+        elsewhere.difference = replace(elsewhere.difference, last=frame.pulse)
+        elsewhere.frames += 1
+        return True
+
+    def _end_elsewhere(self, camera: _Camera, off: float = 0.0, nearest: int = 1) -> None:
+        """End the stretch of frames of other pulses.
+
+        Args:
+            camera: whose it is.
+            off: by how much the clock of the next frame went on more, ns, if that frame is right: then the frames of a
+                stretch that differs by as much are right too.
+            nearest: time from its pulse to the nearest one, ns.
+        """
+        elsewhere, camera.elsewhere = camera.elsewhere, None
+        if elsewhere is None:
+            return
+        if abs(off - elsewhere.difference.by * nearest) < nearest / 2:
+            camera.states[FrameStatus.OK] += elsewhere.frames
+        else:
+            self._differs(elsewhere.difference)
 
     def _differs(self, difference: Difference) -> None:
         self._disagreements += 1

@@ -3,23 +3,21 @@
 Where the times of a camera's frames slip by whole periods, tags and times agree, and two kinds of evidence remain: the
 frame numbers jump against the pulses where the slip begins or ends, and in between each frame comes by so many periods
 later, or sooner, after its pulse than the frames before. Frame numbers alone do not tell how long the slip lasts: where
-they fall short, the times may have come back, or the camera missed a pulse.
+they fall short, the times may have come back, or the camera missed a pulse. If it missed one just when they slipped,
+the numbers do not jump at all, and the arrivals alone tell it (`arrivals`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from rig.pulse import PulseNumber
+from triggering.ledger.arrivals import FRAMES, RHYTHM
 
-#: So many frames tell how much the arrivals of a camera scatter.
-FRAMES: Final = 8
 #: The soonest of n arrivals lies beyond half a period by chance with a probability of exp(-n p / 2 m), where m is their
 #: mean excess over the soonest possible one and p the period, if they are exponential, and less often if they are
 #: bounded. n p / m must be so large that this is below 1e-4.
 _SURE: Final = 18.4
-#: Pulses have a rhythm if the times between neighbours differ by less than this factor.
-_RHYTHM: Final = 1.5
 
 
 @dataclass(slots=True)
@@ -30,8 +28,12 @@ class Run:
         first, last: pulses of its first and last frame.
         excess: by how much the numbers went on more than the pulses where it begins; 0 where they prove nothing.
         nearest, farther: the least times from one of its pulses to the nearer and the farther pulse beside it, ns.
-        anew: the camera came, went or was silent before it, so that nothing is known of an earlier slip.
-        frames: how many there are.
+        anew: the camera came, went or was silent before it, or its latency changed, so that nothing is known of an
+            earlier slip.
+        behind: the pulse before its first one has no frame of the camera.
+        level: by how many periods later than usual its frames came; None: they scatter too much to tell.
+        sure: pulse of the last frame that came at the level; there are `at_level` of these.
+        frames: how many there are whose arrivals say something.
         soonest: least time from a pulse to the arrival of its frame, ns.
         late: sum of these times, ns.
     """
@@ -42,15 +44,25 @@ class Run:
     nearest: int
     farther: int
     anew: bool = False
+    behind: bool = False
+    level: int | None = None
+    sure: PulseNumber | None = None
+    at_level: int = 0
     frames: int = 0
-    soonest: int = 0
-    late: int = 0
+    soonest: float = 0
+    late: float = 0
 
-    def take(self, pulse: PulseNumber, late: int, nearest: int, farther: int) -> None:
-        """Take the next frame, which arrived `late` ns after its pulse."""
+    def take(self, pulse: PulseNumber, late: float | None, nearest: int, farther: int) -> None:
+        """Take the next frame, which arrived `late` ns after its pulse; None: that says nothing."""
         self.nearest, self.farther = min(self.nearest, nearest), min(self.farther, farther)
-        self.soonest = late if not self.frames else min(self.soonest, late)
-        self.last, self.frames, self.late = pulse, self.frames + 1, self.late + late
+        self.last = pulse
+        if late is not None:
+            self.soonest = min(self.soonest, late) if self.frames else late
+            self.frames, self.late = self.frames + 1, self.late + late
+
+    def came_at(self, level: int) -> None:
+        """Note that the last frame came by so many periods later than usual."""
+        self.level, self.sure, self.at_level = level, self.last, self.at_level + 1
 
     def add(self, other: "Run") -> None:
         """Take the frames of another run."""
@@ -66,12 +78,14 @@ class Stretch:
         first, last: its pulses.
         by: the frames are of so many pulses later; negative: earlier.
         later: by how much later, on average, they came after their pulses than the frames before, ns.
+        jumps: the frame numbers jump where it begins.
     """
 
     first: PulseNumber
     last: PulseNumber
     by: int
     later: float
+    jumps: bool
 
 
 def shifts(runs: Sequence[Run]) -> list[int]:
@@ -82,49 +96,70 @@ def shifts(runs: Sequence[Run]) -> list[int]:
     """
     found: list[int | None] = []
     usual = Run(PulseNumber(0), PulseNumber(0), 0, 0, 0)  # all frames that are right
-    shift = low = high = 0
-    for run in runs:
+    shift = low = high = base = 0
+    for place, run in enumerate(runs):
         if run.anew:
             usual = Run(run.first, run.first, 0, 0, 0)
             shift = low = high = 0
+            base = run.level or 0
         low, high = low + min(0, run.excess), high + max(0, run.excess)
-        # A camera may miss pulses where its times come back: the numbers only bound what arrivals tell.
-        if (low == high and not shift) or usual.frames < FRAMES:
-            own: int | None = 0
+        if run.level is not None:
+            shift = run.level - base if _lasts(runs, place) else 0
+            found.append(shift)
+            low = high = 0
         else:
-            own = _shift(usual, run)
-        found.append(own)
-        if own is None:
-            continue
-        if low <= own - shift <= high or not own:
-            shift = own
-        found[-1], low, high = shift, 0, 0
+            # A camera may miss pulses where its times come back: the numbers only bound what arrivals tell.
+            if (low == high and not shift) or usual.frames < FRAMES:
+                own: int | None = 0
+            else:
+                own = shift_of(usual, run)
+            found.append(own)
+            if own is None:
+                continue
+            if low <= own - shift <= high or not own:
+                shift = own
+            found[-1], low, high = shift, 0, 0
         if not shift:
             usual.add(run)
     return [_between(found, place) for place in range(len(found))]
 
 
+def _lasts(runs: Sequence[Run], place: int) -> bool:
+    """Whether a run at another level holds frames of other pulses, and not a few frames that were late.
+
+    Where the times of a few frames were off, the pulse of the last of them, or of the first, has no frame.
+    """
+    run = runs[place]
+    if not run.level or run.at_level >= FRAMES:
+        return True
+    beside = [runs[at] for at in (place - 1, place + 1) if 0 <= at < len(runs)]
+    hole = run.behind if run.level < 0 else place + 1 < len(runs) and runs[place + 1].behind
+    return hole or any(each.level == run.level for each in beside)
+
+
 def stretches(runs: Sequence[Run], shifted: Sequence[int]) -> list[Stretch]:
     """The stretches of runs that are shifted, as `shifts` says."""
     found: list[Stretch] = []
-    right: Run | None = None
+    usual = 0.0
     for place, (run, by) in enumerate(zip(runs, shifted, strict=True)):
+        mean = run.late / run.frames if run.frames else usual + by * run.nearest
         if not by:
-            right = run
+            usual = mean
         elif place and shifted[place - 1] == by:
-            found[-1] = Stretch(found[-1].first, run.last, by, found[-1].later)
+            found[-1] = replace(found[-1], last=run.sure or run.last)
         else:
-            usual = 0.0 if right is None else right.late / right.frames
-            found.append(Stretch(run.first, run.last, by, run.late / run.frames - usual))
+            found.append(Stretch(run.first, run.sure or run.last, by, mean - usual, run.excess != 0))
     return found
 
 
-def _shift(usual: Run, run: Run) -> int | None:
+def shift_of(usual: Run, run: Run) -> int | None:
     """By how many periods later than usual the frames of a run came; None: too few to tell, or no rhythm.
 
     The soonest tells it, which a slow link does not change, and the mean, which one odd time does not change.
     """
-    if run.farther >= _RHYTHM * run.nearest:
+    if run.farther >= RHYTHM * run.nearest:
+        return None
+    if not run.frames:
         return None
     mean_excess = max(each.late / each.frames - each.soonest for each in (usual, run))
     if min(usual.frames, run.frames) * run.nearest < _SURE * mean_excess:

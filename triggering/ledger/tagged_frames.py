@@ -26,6 +26,11 @@ class TaggedFrame:
     device: int
     host: int
 
+    @property
+    def late(self) -> int:
+        """Time from the pulse to the arrival of the frame, ns."""
+        return self.host - self.time
+
 
 def frame_of(tag: TripletTag, part: CameraTag) -> TaggedFrame | None:
     """The frame of a camera's part of a tag; None if a field is missing or impossible."""

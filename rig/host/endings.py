@@ -51,6 +51,21 @@ def counted_endings(signals: tuple[signal.Signals, ...] = ENDINGS) -> Iterator[A
             signal.signal(number, handler)
 
 
+@contextmanager
+def interrupted_by_endings() -> Iterator[None]:
+    """Within, a closed terminal and `kill` do what Ctrl-C does: nothing half done is left behind.
+
+    A signal that `nohup` has switched off stays so.
+    """
+    wanted = [number for number in ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
+    before = {number: signal.signal(number, signal.default_int_handler) for number in wanted}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def nobody_asks() -> int:
     """Nobody asks the program to end."""
     return 0

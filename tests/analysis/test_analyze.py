@@ -3,6 +3,7 @@
 import functools
 import json
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -20,9 +21,10 @@ from recorder.reading.triplets import stored_triplets
 from tests.analysis.measured import FIRST_DAY, PULSES, measured_jump
 from tests.analysis.simulated import training
 from tests.recorder.split import split_log
-from tests.support.commands import run_svev
+from tests.support.commands import run_svev, start_svev
 from tests.support.kept import kept_hill_log
 from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
 
 AT_MOST = 6.0  # sigmas, of live states: where the motion has just changed, large errors are not so rare
 
@@ -36,6 +38,17 @@ def svev(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[s
     done = run_svev(*map(str, arguments), timeout_s=170)
     assert done.returncode == code, done.stderr
     return done
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("ending", [signal.SIGHUP, signal.SIGTERM])
+def test_a_closed_terminal_leaves_no_half_written_result(jump: HillLog, tmp_path: Path, ending: signal.Signals) -> None:
+    out = tmp_path / "out"
+    with start_svev("analyze", str(jump.path), "--survey", str(jump.survey), "--out", str(out)) as command:
+        wait_until(lambda: out.is_dir() or command.poll() is not None, "it writes", 170)
+        command.send_signal(ending)
+        assert command.wait(60) == 130, command.written()
+    assert not [file.name for file in out.iterdir() if file.name.startswith(".")]
 
 
 @pytest.mark.long

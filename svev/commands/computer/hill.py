@@ -1,10 +1,7 @@
 """`svev setup`: asks what a new hill needs, writes its files, and rehearses."""
 
 import shlex
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from ipaddress import IPv4Network
 from pathlib import Path
@@ -14,7 +11,7 @@ import typer
 
 from recorder.publishing.keys import check_publication
 from rig.errors import BadInputError, SvevError
-from rig.host.endings import ENDINGS, counted_endings
+from rig.host.endings import counted_endings, interrupted_by_endings
 from rig.settings.file import load_rig
 from svev import console
 from svev.commands.rig.record import aside
@@ -111,7 +108,7 @@ def setup(
     dialog = Dialog(asks=not yes, aside=as_json)
     today = Today.of(places.folder)
     try:
-        with _interrupted_by_all_endings():
+        with interrupted_by_endings():
             with pictures() as place:
                 answers = Interview(given, today, places, dialog, partial(search, place, network or "")).ask()
             written = write(answers, today, places)
@@ -127,17 +124,6 @@ def setup(
         console.print_json(_as_json(answers, today, places, written, commands) | _rehearsed_json(done, failed))
     if failed or (done is not None and not done.ready):
         raise typer.Exit(_NOT_READY)
-
-
-@contextmanager
-def _interrupted_by_all_endings() -> Iterator[None]:
-    """Within, a closed terminal and `kill` do what Ctrl-C does: nothing is left behind."""
-    before = {number: signal.signal(number, signal.default_int_handler) for number in ENDINGS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _check_network(text: str) -> None:

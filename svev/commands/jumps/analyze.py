@@ -14,6 +14,7 @@ from analysis.report.figures import five_figures, plus_minus
 from analysis.report.kinogram.earlier import read_earlier
 from analysis.result import file as result_file
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from rig.host.endings import interrupted_by_endings
 from svev import console
 from svev.clock_warning import warn_of_clock
 from svev.commands.logs.contents import AlsoJson, LogPath
@@ -64,7 +65,7 @@ def analyze_command(
     by_hand_only = None if measurements is None else read_measurements(measurements)
     more = None if by_hand is None else read_measurements(by_hand)
     before = [jump for folder in earlier or () for jump in read_earlier(folder)]
-    with console.steps() as tell:
+    with interrupted_by_endings(), console.steps() as tell:
         try:
             analysis = analyze(
                 log,

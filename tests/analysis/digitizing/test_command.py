@@ -54,6 +54,9 @@ def test_marks_are_there_after_the_command_was_killed(jump: HillLog) -> None:
             assert refused.status_code == 403
         command.send_signal(signal.SIGTERM)
         assert command.wait(20) == 0
+    with _served(str(jump.path)) as (command, _):
+        command.send_signal(signal.SIGHUP)
+        assert command.wait(20) == 0, "a closed terminal ends it in order"
 
 
 @pytest.mark.long

@@ -104,6 +104,7 @@ _SENTENCES: Final = (
     ("datum: control points, distances and differences", "datum: kontrollpunkter, avstander og differanser"),
     ("risk of the global test {a}, that anything is suspected in sound data {b}", "risiko for den globale testen {a}, for at noe mistenkes i feilfrie data {b}"),
     ("all sigmas below are a posteriori: they carry the estimated sigma0", "alle sigma nedenfor er a posteriori: de har med den estimerte sigma0"),
+    ("few observations are redundant; the a-priori variance counts as four more: they carry {a} instead of {b}", "få observasjoner er overtallige; a priori-variansen teller som fire til: de har med {a} i stedet for {b}"),
     ("agrees: {words}", "stemmer: {words}"), ("smaller: {words}", "mindre: {words}"), ("larger: {words}", "større: {words}"), ("untested: {words}", "ikke testet: {words}"),
     ("Lengths in {u}, metric frame (x right, y up, origin at the image centre).", "Lengder i {u}, metrisk system (x til høyre, y opp, origo i bildets midtpunkt)."),
     ("The distortion acts on the side: {_cameras}.", "Fortegningen virker på siden (projected: avbildet, observed: målt): {_cameras}."),

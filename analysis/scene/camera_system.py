@@ -200,7 +200,7 @@ def _of_given(a: Adjustment, columns: Integers) -> Floats:
     control, interior = relations.rows(Kind.CONTROL), relations.rows(Kind.CAMERA)
     observed = [int(unknowns.point[relations.item[i], relations.part[i]]) for i in control]
     observed += [int(unknowns.camera[relations.item[i], place[int(relations.part[i])]]) for i in interior]
-    sigma = a.problem.relation_sigma[np.concatenate((control, interior))] * a.ratio
+    sigma = a.problem.relation_sigma[np.concatenate((control, interior))] * a.scale
     free = np.array(observed, np.intp) >= 0
     rows = np.array(observed, np.intp)[free]
     cross = a.covariance(np.concatenate((columns, rows)))[: len(columns), len(columns) :] / sigma[free]

@@ -21,6 +21,7 @@ from photogrammetry.network.diagnosis import (
 from photogrammetry.network.model import Camera, Network
 from photogrammetry.network.selection import with_interior
 from photogrammetry.procedures.minima import Minimum, moved_images, possible_minima
+from photogrammetry.procedures.place_profile import place_holds
 from photogrammetry.start_values.resection import resect
 from photogrammetry.start_values.search import complete
 from photogrammetry.start_values.sightings import reduce_observations
@@ -41,17 +42,34 @@ _IMAGES: Final = 8  # with more images one exchange of cameras spoils little, an
 def refuse_ambiguous(given: Network, a: Adjustment) -> None:
     """Refuse a result whose images have several possible poses, because three points alone or a plane fix them.
 
+    Nor is one given whose sigmas do not tell where an image may be.
+
     Args:
         given: the network before it got start values: an image whose pose it gives is decided by that.
         a: the adjusted network.
 
     Raises:
-        NotSolvableError: names the images with all their possible places.
+        NotSolvableError: names the images with their possible places.
     """
     known = {image.name for image in given.images if image.position is not None and image.rotation is not None}
-    defects = (*_ambiguities(a, known), *_undecided(given, a, known))
+    defects = (*_ambiguities(a, known), *_undecided(given, a, known)) or tuple(_unheld(a, known))
     if defects:
         raise NotSolvableError(defects)
+
+
+def _unheld(a: Adjustment, known: set[str]) -> Iterator[Defect]:
+    """The images whose sigmas do not tell where they may be."""
+    for i, image in enumerate(a.network.images):
+        if image.name in known or not image.estimate or image.sigma_position is not None or place_holds(a, i):
+            continue
+        text = (
+            "image {image} is hardly determined: the residuals allow places farther from X0 {place} than five of its "
+            "sigmas ({sigma}); survey points farther apart or off their plane, come nearer, or give an approximate pose"
+        )
+        sigma = _place(a.sigmas(a.problem.unknowns.pose[i, :3]))
+        place = _place(a.state.position[i])
+        said = phrase("defect_weak_place", text, image=image.name, place=place, sigma=sigma)
+        yield Defect(DefectKind.IMAGES, 0, said, images=(image.name,))
 
 
 def _undecided(given: Network, a: Adjustment, known: set[str]) -> Iterator[Defect]:

@@ -21,6 +21,7 @@ from photogrammetry.adjustment.gross_errors.snooping import BENT
 from photogrammetry.adjustment.gross_errors.suspicion import FAMILY_RISK, SINGLE_RISK
 from photogrammetry.adjustment.run import Outcome, adjust
 from photogrammetry.adjustment.solution.adjustment import Adjustment, adjust_once
+from photogrammetry.adjustment.solution.statistics import A_PRIORI
 from photogrammetry.geometry.ideal_camera import IdealCamera
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from photogrammetry.network.model import Network, Reweight
@@ -39,8 +40,6 @@ from rig.errors import BadInputError
 WORSE: Final = 25.0
 #: Times that: a reflected pose whose own image says so beforehand is not adjusted.
 _HOPELESS: Final = 20.0
-#: Redundant observations that the a-priori variance is worth: sigmas are misjudged by a factor of two at times.
-_A_PRIORI: Final = 4
 _FEWEST: Final = 4  # points of an image; three fit several poses exactly (`doubtful_poses`)
 _COMBINED: Final = 3  # images of which all combinations are tried; of more of them each alone, and all together
 _SAME: Final = 0.05  # sigmas of the projection centres by which one minimum differs from itself
@@ -166,8 +165,8 @@ def is_worse(other: Minimum, best: Minimum, redundancy: int) -> bool:
         redundancy: of the network.
     """
     difference = other.square_sum - best.square_sum
-    freedom = redundancy + _A_PRIORI
-    variance = (best.square_sum + _A_PRIORI) / freedom
+    freedom = redundancy + A_PRIORI
+    variance = (best.square_sum + A_PRIORI) / freedom
     return bool(difference > WORSE and special.fdtrc(1, freedom, difference / variance) < SINGLE_RISK)
 
 

@@ -103,7 +103,7 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
 
 def _global_test(a: Adjustment) -> dict[str, Any]:
     test = GlobalTest(a.ratio, a.redundancy)
-    numbers = {"ratio": a.ratio, "probability": test.chance}
+    numbers = {"ratio": a.ratio, "scale": a.scale, "probability": test.chance}
     return numbers | {"verdict": test.verdict.value, "words": test.words, "usable": not is_unusable(a)}
 
 

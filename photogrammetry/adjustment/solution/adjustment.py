@@ -24,6 +24,7 @@ from photogrammetry.adjustment.solution.statistics import (
     Redundancy,
     correlation,
     minimal_detectable,
+    posterior_scale,
     redundancy,
     w_values,
 )
@@ -107,6 +108,11 @@ class Adjustment:
         return float(np.sqrt(self.equations.square_sum / self.redundancy)) if self.redundancy else 1.0
 
     @property
+    def scale(self) -> float:
+        """The factor from the root of a cofactor to a standard deviation, in a-priori sigma0: `posterior_scale`."""
+        return posterior_scale(self.equations.square_sum, self.redundancy)
+
+    @property
     def sigma0(self) -> float | None:
         """Estimated sigma0 in the unit of the file's; None without redundancy."""
         return self.ratio * self.network.sigma0 if self.redundancy else None
@@ -123,14 +129,14 @@ class Adjustment:
         """
         if not self.cofactors.size:
             return np.zeros((*columns.shape, columns.shape[-1]))
-        block = self.cofactors[columns[..., :, None], columns[..., None, :]] * self.ratio**2
+        block = self.cofactors[columns[..., :, None], columns[..., None, :]] * self.scale**2
         known = columns >= 0
         return np.asarray(np.where(known[..., :, None] & known[..., None, :], block, 0.0), dtype=float)
 
     def sigmas(self, columns: Integers) -> Floats:
         """A-posteriori standard deviations of unknowns, same shape as `columns`; zero for constants."""
         variance = np.append(np.diagonal(self.cofactors), 0.0)[columns]
-        return np.asarray(self.ratio * np.sqrt(np.maximum(variance, 0.0)), dtype=float)
+        return np.asarray(self.scale * np.sqrt(np.maximum(variance, 0.0)), dtype=float)
 
     def parameters(self, camera: int) -> tuple[list[Parameter], Floats]:
         """The estimated parameters of a camera (index), and their correlation matrix (k, k)."""

@@ -191,7 +191,7 @@ class _Profile:
     def _line(self) -> Floats:
         """The step of all unknowns by which the parameter moves by one sigma, and the others follow."""
         q = self._a.cofactors[:, self._column]
-        line: Floats = q / np.sqrt(q[self._column]) * self._a.ratio
+        line: Floats = q / np.sqrt(q[self._column]) * self._a.scale
         return line
 
     @cached_property
@@ -210,7 +210,7 @@ class _Profile:
 
     def _rise(self, state: State) -> float:
         a = self._a
-        return (a.problem.square_sum(state) - a.equations.square_sum) / a.ratio**2
+        return (a.problem.square_sum(state) - a.equations.square_sum) / a.scale**2
 
 
 def _holding(problem: Problem, camera: int, name: str) -> Problem:

@@ -7,6 +7,7 @@ diagonal of R, and their sum is the network's redundancy.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import special
 
 from photogrammetry.adjustment.equations.problem import Equations, Problem
 from rig.arrays import Floats
@@ -15,6 +16,12 @@ from rig.arrays import Floats
 UNCONTROLLED = 1e-8
 #: Non-centrality that a blunder needs to be found: significance 0.1 %, power 80 % (Baarda).
 NON_CENTRALITY = 4.13
+#: Redundant observations that the a-priori variance is worth: sigmas are misjudged by a factor of two at times.
+A_PRIORI = 4
+#: With so few redundant observations chance makes the estimated sigma0 so small that five sigmas are none.
+_FEW = 30
+#: Probability of a sigma0 so small that chance does not explain it: beyond five sigmas, on one side.
+_NO_CHANCE = 2.9e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +72,25 @@ def redundancy(problem: Problem, equations: Equations, cofactors: Floats) -> Red
     block = cofactors[relation.columns[:, :, None], relation.columns[:, None, :]]
     seen = np.einsum("mi,mij,mj->m", relation.values, block, relation.values)
     return Redundancy(np.eye(2) - explained, 1.0 - seen)
+
+
+def posterior_scale(square_sum: float, redundancy: int) -> float:
+    """The factor from the root of a cofactor to a standard deviation, in a-priori sigma0.
+
+    It is the estimated sigma0. Two redundant observations give one of a fifth in four of a hundred networks whose
+    sigmas are right, and an error of one sigma would be one of five. So where few are redundant, and chance explains
+    that the estimate is small, the a-priori variance counts as `A_PRIORI` observations beside them.
+
+    Args:
+        square_sum: of the residuals, in a-priori variances.
+        redundancy: of the network; 0: the a-priori sigmas stand.
+    """
+    if redundancy <= 0:
+        return 1.0
+    small = square_sum < redundancy <= _FEW
+    if small and special.chdtr(redundancy, square_sum) > _NO_CHANCE:
+        return float(np.sqrt((square_sum + A_PRIORI) / (redundancy + A_PRIORI)))
+    return float(np.sqrt(square_sum / redundancy))
 
 
 def w_values(v: Floats, r: Floats, sigma0: float) -> Floats:

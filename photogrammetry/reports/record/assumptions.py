@@ -33,7 +33,15 @@ def assumptions(a: Adjustment) -> tuple[str | Table, ...]:
         _datum(a),
         f"risk of the global test {GLOBAL_RISK:.0%}, that anything is suspected in sound data {FAMILY_RISK:.0%}",
         "all sigmas below are a posteriori: they carry the estimated sigma0",
+        *_pooled(a),
     )
+
+
+def _pooled(a: Adjustment) -> Iterator[str]:
+    """What the sigmas carry instead of the estimated sigma0, if few observations are redundant."""
+    if a.scale > a.ratio:
+        carried = f"{a.scale * a.network.sigma0:.3g} instead of {a.sigma0:.3g}"
+        yield f"few observations are redundant; the a-priori variance counts as four more: they carry {carried}"
 
 
 def _image_rows(network: Network) -> Iterator[tuple[str, ...]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from photogrammetry.adjustment.solution.global_test import GLOBAL_RISK, GlobalTest, Verdict
+from photogrammetry.adjustment.solution.statistics import posterior_scale
 from photogrammetry.network.file_writer import write_network
 from svev.cli import main
 from tests.photogrammetry.synthetic import hill
@@ -29,6 +30,26 @@ from tests.photogrammetry.synthetic import hill
 )
 def test_verdict(ratio: float, redundancy: int, verdict: Verdict) -> None:
     assert GlobalTest(ratio, redundancy).verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("square_sum", "redundancy", "scale"),
+    [
+        (18.0, 2, 3.0),
+        (0.08, 2, (4.08 / 6.0) ** 0.5),
+        (0.5, 6, (4.5 / 10.0) ** 0.5),
+        (1e-12, 2, (1e-12 / 2.0) ** 0.5),
+        (2e-8, 6, (2e-8 / 6.0) ** 0.5),
+        (20.0, 31, (20.0 / 31.0) ** 0.5),
+        (2980.0, 3725, 0.8**0.5),
+        (0.0, 0, 1.0),
+    ],
+)
+def test_sigmas_carry_the_estimated_sigma0_but_chance_shrinks_none(
+    square_sum: float, redundancy: int, scale: float
+) -> None:
+    """With few redundant observations the a-priori variance counts as four more, unless chance cannot explain it."""
+    assert posterior_scale(square_sum, redundancy) == pytest.approx(scale)
 
 
 def test_limits_are_those_of_the_risk() -> None:

@@ -65,6 +65,7 @@ export const adjustment = {
   defect_interior: ["{names} kan ikke skilles fra plasseringene og punktene ({size} ubestemt); ta bilder som er dreid 90 grader og fra andre avstander, bestem færre parametre, eller gi dem en sigma"],
   defect_joint: ["{which} bestemmes ikke sammen ({size} ubestemt); legg til observasjoner"],
   defect_singular: ["ved optimum er nettet singulært så langt tallene rekker; bestem færre kameraparametre"],
+  defect_weak_place: ["bilde {image} er knapt bestemt: restfeilene tillater plasseringer lenger fra X0 {place} enn fem av dens sigma ({sigma}); mål inn punkter lenger fra hverandre eller utenfor planet deres, kom nærmere, eller oppgi en omtrentlig plassering"],
   defect_two_poses: ["bilde {image} har {count} plasseringer som restfeilene ikke avgjør mellom, fordi de innmålte punktene nesten ligger i et plan: X0 {places} med vTPv {sums}; mål inn et punkt utenfor det planet, kom nærmere, eller oppgi en omtrentlig plassering"],
   defect_three_points: ["bilde {image} viser bare tre punkter, som passer like godt til {count} plasseringer: X0 {places}; mål et fjerde punkt i det, eller oppgi en omtrentlig plassering"],
 };

@@ -6,13 +6,17 @@ from pathlib import Path
 import pytest
 
 from recorder.catalogue.entry import read_entry
+from recorder.catalogue.folder import Catalogue
 from recorder.log.extent import ENDED_EARLY, ENDED_EARLY_SAID, as_field, extent
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.append_file import storage_error
+from rig.api.statement import Level
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, plain
+from service.recordings.describing import Chain, as_recording
 from service.recordings.verdicts import verdict
-from tests.recorder.logs import ALL_OK, LOST, OK, SHAPE, make_tag, open_writer, write_pulse
+from tests.recorder.logs import ALL_OK, LOST, OK, SHAPE, make_tag, open_writer, write_log, write_pulse
+from tests.recorder.split import split_log
 
 
 @pytest.mark.parametrize(
@@ -74,3 +78,32 @@ def _log(folder: Path, fields: dict[str, str]) -> Path:
         log.set_metadata("svev.recording", extent(make_tag(1).time, make_tag(1).time) | fields)
     buffers.close()
     return path
+
+
+@pytest.mark.parametrize(
+    ("gone", "code", "words"),
+    [
+        (
+            0,
+            "verdict_part_gone",
+            "Goes on from r1, which is not here: the beginning is missing. Complete: all 6 pulses",
+        ),
+        (
+            2,
+            "verdict_next_part_gone",
+            "Goes on in r1-part3, which is not here: the end is missing. Complete: all 7 pulses",
+        ),
+    ],
+)
+def test_a_recording_whose_first_or_last_part_is_gone_is_not_complete(
+    gone: int, code: str, words: str, tmp_path: Path
+) -> None:
+    log, folder = tmp_path / "whole.mcap", tmp_path / "recordings"
+    folder.mkdir()
+    write_log(log, (ALL_OK,) * 10)
+    parts = split_log(log, folder / "r1.mcap", (4, 3))
+    parts[gone].unlink()
+    catalogue = Catalogue(folder)
+    (entry,) = catalogue.entries()
+    said = Chain(catalogue, [entry]).pointing_on(as_recording(entry)).verdict
+    assert (said.level, said.code, said.text) == (Level.WARNING, code, words)

@@ -16,6 +16,8 @@ from typing import Any, Final
 import msgspec
 from isal.isal_zlib import crc32
 
+from recorder.log.part_path import numbered
+
 NAME: Final = ".svev-catalogue.db"
 #: The file, and what SQLite keeps beside it while it is open.
 FILES: Final = (NAME, f"{NAME}-wal", f"{NAME}-shm")
@@ -31,29 +33,31 @@ _IN_THE_WAY: Final = frozenset(
     {sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED, sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN}
 )
 #: Counts up when rows of the same log become different ones.
-_FORMAT: Final = 2
+_FORMAT: Final = 3
 _VERSION: Final = crc32(f"{version('svev')}.{_FORMAT}".encode()) & 0x7FFF_FFFF
 
 #: Main figures of a jump that are searched for, as `rig.api.jump.LastJump` names them.
 FIGURES: Final = ("takeoff_speed", "perpendicular", "speed_20_m", "angle_of_attack", "ski_to_body")
 _COLUMNS: Final = {
-    "logs": ("path", "keys", "plain", "entry"),
+    "logs": ("path", "deleted", "growing", "keys", "plain", "entry"),
     "recordings": (
-        "path", "id", "deleted", "growing", "time_ns", "duration_s", "level", "athlete", "bib", "bib_number",
-        "favourite", "tags", "continues", "part", "hill", "text", "session", "said",
+        "path", "id", "deleted", "time_ns", "duration_s", "level", "athlete", "bib", "bib_number", "favourite", "tags",
+        "continues", "part", "hill", "text", "session", "said", "entry",
     ),
     "jumps": ("path", "jump", "time_ns", "live", "ok", *FIGURES, "content"),
 }  # fmt: skip
 _SCHEMA: Final = f"""
-CREATE TABLE logs (path TEXT PRIMARY KEY, keys BLOB, plain BLOB, entry BLOB, checksum INTEGER) WITHOUT ROWID;
+CREATE TABLE logs (
+  path TEXT PRIMARY KEY, deleted INTEGER, growing INTEGER, keys BLOB, plain BLOB, entry BLOB, checksum INTEGER
+) WITHOUT ROWID;
+CREATE INDEX logs_growing ON logs (deleted) WHERE growing;
 CREATE TABLE recordings (
-  path TEXT PRIMARY KEY, id TEXT, deleted INTEGER, growing INTEGER, time_ns INTEGER, duration_s REAL, level TEXT,
-  athlete TEXT, bib TEXT, bib_number INTEGER, favourite INTEGER, tags TEXT, continues TEXT, part INTEGER, hill TEXT,
-  text TEXT, session TEXT, said TEXT, checksum INTEGER);
+  path TEXT PRIMARY KEY, id TEXT, deleted INTEGER, time_ns INTEGER, duration_s REAL, level TEXT, athlete TEXT, bib TEXT,
+  bib_number INTEGER, favourite INTEGER, tags TEXT, continues TEXT, part INTEGER, hill TEXT, text TEXT, session TEXT,
+  said TEXT, entry BLOB, checksum INTEGER);
 CREATE INDEX recordings_time ON recordings (deleted, time_ns, id);
 CREATE INDEX recordings_athlete ON recordings (athlete);
 CREATE INDEX recordings_continues ON recordings (continues) WHERE continues != '';
-CREATE INDEX recordings_growing ON recordings (deleted) WHERE growing;
 CREATE TABLE jumps (
   path TEXT, jump INTEGER, time_ns INTEGER, live INTEGER, ok INTEGER, {", ".join(f"{name} REAL" for name in FIGURES)},
   content BLOB, checksum INTEGER, PRIMARY KEY (path, jump)) WITHOUT ROWID;
@@ -170,6 +174,10 @@ def _check(connection: sqlite3.Connection) -> None:
         broken |= {row[0] for row in rows if row[-1] != _checksum(row[:-1])}
     if any(not isinstance(path, str) for path in broken):
         raise sqlite3.DatabaseError("damaged")
+    if broken:  # with them go the other parts of split recordings, which stand in one row
+        firsts = {numbered(Path(path))[0] for path in broken}
+        logs = connection.execute("SELECT path FROM logs").fetchall()
+        broken |= {path for (path,) in logs if numbered(Path(path))[0] in firsts}
     for path in broken:
         remove(connection, path)
 

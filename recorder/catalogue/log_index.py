@@ -5,8 +5,8 @@ import sqlite3
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC
 from functools import partial
@@ -18,34 +18,25 @@ from recorder.catalogue.entry import SUFFIX, Entry, LogState, joined, read_entry
 from recorder.catalogue.file_key import FileKey, file_key, key_of
 from recorder.catalogue.folder_watch import FolderWatch
 from recorder.catalogue.trash import trash_of
-from recorder.log.extent import CONTINUES, CONTINUES_AFTER, PART, part_number
+from recorder.catalogue.whole_recordings import int64, parts_with, put_recording
 from recorder.log.jumper_path import jumper_path
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import session_path
 from recorder.log.write_lock import is_being_written
 from recorder.reading.log_reader import LogReader
 from recorder.reading.parts import parts_of
-from rig.api.athletes import JumpQuery, folded
+from rig.api.athletes import JumpQuery
 from rig.api.jump import LastJump
 from rig.api.recordings import RecordingQuery
 from rig.api.statement import Level
 from rig.errors import BadInputError
 from rig.host.file_names import is_recording_id
-from rig.phrase import escaped
 from rig.transport import wire
 
 #: A growing log is read again when this many times the duration of the last reading has passed.
 _PATIENCE: Final = 10
 #: So many logs are read before what was learned of them is kept.
 _TOGETHER: Final = 100
-_INT64_MAX: Final = (1 << 63) - 1
-_LONGEST_SEARCHED: Final = 20_000
-#: Session fields that no person has written.
-_UNSEARCHED: Final = frozenset({"session", "recording", CONTINUES, CONTINUES_AFTER, PART, "favourite"})
-
-#: Session fields that a list of jumps shows.
-_SHOWN: Final = ("athlete", "bib", "gate")
-
 #: Keys of the log, of the changes of its session, of its results (whole and live); None: there is no such file.
 Keys = tuple[FileKey | None, FileKey | None, FileKey | None, FileKey | None]
 _KEYS: Final = wire.decoder(Keys)
@@ -138,8 +129,8 @@ class LogIndex:
 
         def answer(connection: sqlite3.Connection) -> tuple[int, list[Entry]]:
             self._look_around(connection, deleted=query.deleted)
-            total, paths = search.found_paths(connection, query)
-            return total, [self._whole(connection, path) for path in paths]
+            total, entries = search.found_recordings(connection, query)
+            return total, [_ENTRIES.decode(entry) for entry in entries]
 
         return self._answer(answer)
 
@@ -166,9 +157,9 @@ class LogIndex:
 
         def answer(connection: sqlite3.Connection) -> Mapping[str, str]:
             self._look_around(connection, deleted=deleted)
-            linked = "continues = ? AND continues != '' AND deleted = ? AND part = 1"
-            asked = f"SELECT continues, id FROM recordings WHERE {linked}"  # noqa: S608
-            return dict(row for each in ids for row in connection.execute(asked, (each, int(deleted))))
+            wanted = "continues IN (SELECT value FROM json_each(?)) AND continues != '' AND deleted = ? AND part = 1"
+            asked = f"SELECT continues, id FROM recordings WHERE {wanted}"  # noqa: S608
+            return dict(connection.execute(asked, (wire.encode(ids).decode(), int(deleted))).fetchall())
 
         return self._answer(answer)
 
@@ -180,18 +171,6 @@ class LogIndex:
         """
         parts = parts_of(path)
         return joined([self.entry(part) for part in parts[parts.index(path) :]])
-
-    def _whole(self, connection: sqlite3.Connection, path: str) -> Entry:
-        """The same, by what is known of the folder."""
-        asked = "SELECT entry FROM logs WHERE path = ?"
-        following = "SELECT path FROM recordings WHERE continues = ? AND continues != '' AND part > 1 AND deleted = ?"
-        parts: list[Entry] = [_ENTRIES.decode(connection.execute(asked, (path,)).fetchone()[0])]
-        while row := connection.execute(following, (parts[-1].id, int(parts[0].deleted))).fetchone():
-            part: Entry = _ENTRIES.decode(connection.execute(asked, row).fetchone()[0])
-            if any(part.id == each.id for each in parts):  # of a stranger
-                break
-            parts.append(part)
-        return joined(parts)
 
     def _folders(self) -> dict[bool, Path]:
         return {False: self._directory, True: trash_of(self._directory)}
@@ -232,7 +211,7 @@ class LogIndex:
             if names is None:
                 self._look_at_all(connection, folder, deleted=deleted)
                 return
-            growing = "SELECT path FROM recordings WHERE growing AND deleted = ?"
+            growing = "SELECT path FROM logs WHERE growing AND deleted = ?"
             stems = {stem for name in names if (stem := _stem(name)) is not None}
             stems |= {Path(row[0]).stem for row in connection.execute(growing, (int(deleted),)).fetchall()}
             for stem in stems:
@@ -241,9 +220,9 @@ class LogIndex:
                     self._look(connection, str(path.relative_to(self._directory)), _keys_of(path))
         except FileNotFoundError:
             watch.forget()
-            connection.execute("DELETE FROM recordings WHERE deleted = ?", (int(deleted),))
-            connection.execute("DELETE FROM logs WHERE path NOT IN (SELECT path FROM recordings)")
-            connection.execute("DELETE FROM jumps WHERE path NOT IN (SELECT path FROM recordings)")
+            for table in ("recordings", "logs"):
+                connection.execute(f"DELETE FROM {table} WHERE deleted = ?", (int(deleted),))  # noqa: S608
+            connection.execute("DELETE FROM jumps WHERE path NOT IN (SELECT path FROM logs)")
             raise
         except BaseException:
             watch.forget()  # what was told is not yet known
@@ -254,10 +233,9 @@ class LogIndex:
         with os.scandir(folder) as found:
             files = {each.name: each for each in found}
         below = "" if folder == self._directory else f"{folder.relative_to(self._directory)}/"
-        asked = "SELECT path, keys FROM logs WHERE path IN (SELECT path FROM recordings WHERE deleted = ?)"
+        asked = "SELECT path, keys FROM logs WHERE deleted = ?"
         known = dict(connection.execute(asked, (int(deleted),)).fetchall())
-        growing = "SELECT path FROM recordings WHERE growing"
-        changing = {row[0] for row in connection.execute(growing)}
+        changing = {row[0] for row in connection.execute("SELECT path FROM logs WHERE growing")}
 
         def key(name: str) -> FileKey | None:
             with suppress(OSError, KeyError):
@@ -282,7 +260,7 @@ class LogIndex:
             finally:
                 connection.execute("COMMIT")
         for name in known:
-            database.remove(connection, name)
+            self._forget(connection, name)
 
     def _look(self, connection: sqlite3.Connection, name: str, keys: Keys) -> Entry:
         """The entry of a file, read anew as far as it has changed.
@@ -306,7 +284,7 @@ class LogIndex:
             if plain is None:
                 plain = self._read(path, name)
         except FileNotFoundError:
-            database.remove(connection, name)
+            self._forget(connection, name)
             raise
         growing = plain.state is LogState.UNFINISHED
         if row and row[0] == encoded and not growing:
@@ -353,37 +331,53 @@ class LogIndex:
         jumps: Iterable[FoundJump] | None,
     ) -> None:
         """Keep what was learned of a log; `jumps`: None if they are known."""
-        database.put(connection, "logs", (name, keys, wire.encode(plain), wire.encode(entry)))
-        session = {field: escaped(text) for field, text in entry.session.items()}
-        said = "\n".join((entry.id, *(text for field, text in session.items() if field not in _UNSEARCHED)))
-        bib = folded(session.get("bib", ""))
-        database.put(
-            connection, "recordings",
-            (
-                name, entry.id, int(entry.deleted), int(plain.state is LogState.UNFINISHED), _int64(entry.time),
-                float(entry.duration_s), self._judge.level(entry).value, folded(session.get("athlete", "")), bib,
-                int(bib) if bib.isascii() and bib.isdecimal() and len(bib) < 19 else None, int(entry.favourite),
-                "\n".join(("", *(folded(tag) for tag in entry.tags), "")), session.get(CONTINUES, ""),
-                part_number(session),
-                folded(session.get("hill", "") or escaped(entry.rig)), folded(said[:_LONGEST_SEARCHED]),
-                wire.encode({folded(field): folded(text) for field, text in session.items()}).decode(),
-                wire.encode({field: session.get(field, "") for field in _SHOWN}).decode(),
-            ),
-        )  # fmt: skip
-        if jumps is None:
-            return
-        connection.execute("DELETE FROM jumps WHERE path = ?", (name,))
-        for found in jumps:
-            figures = (getattr(found.jump, figure) for figure in database.FIGURES)
-            database.put(
-                connection, "jumps",
-                (
-                    name, found.jump.jump, _int64(search.in_ns(found.jump.time.astimezone(UTC))), int(found.live),
-                    int(found.jump.ok),
-                    *(None if figure is None else float(figure.value) for figure in figures),
-                    found.jump.model_dump_json().encode(),
-                ),
-            )  # fmt: skip
+        with _at_once(connection):
+            before = parts_with(connection, name)
+            growing = int(plain.state is LogState.UNFINISHED)
+            values = (name, int(entry.deleted), growing, keys, wire.encode(plain), wire.encode(entry))
+            database.put(connection, "logs", values)
+            for part in {*before, name}:
+                put_recording(connection, part, self._level)
+            if jumps is None:
+                return
+            connection.execute("DELETE FROM jumps WHERE path = ?", (name,))
+            for found in jumps:
+                figures = (getattr(found.jump, figure) for figure in database.FIGURES)
+                database.put(
+                    connection, "jumps",
+                    (
+                        name, found.jump.jump, int64(search.in_ns(found.jump.time.astimezone(UTC))), int(found.live),
+                        int(found.jump.ok),
+                        *(None if figure is None else float(figure.value) for figure in figures),
+                        found.jump.model_dump_json().encode(),
+                    ),
+                )  # fmt: skip
+
+    def _forget(self, connection: sqlite3.Connection, name: str) -> None:
+        """Forget a log that is gone; what is left of its recording stays."""
+        with _at_once(connection):
+            left = {*parts_with(connection, name)} - {name}
+            database.remove(connection, name)
+            for part in left:
+                put_recording(connection, part, self._level)
+
+    def _level(self, entry: Entry) -> str:
+        return self._judge.level(entry).value
+
+
+@contextmanager
+def _at_once(connection: sqlite3.Connection) -> Iterator[None]:
+    """Have everything that is changed in the block kept, or nothing."""
+    if connection.in_transaction:
+        yield
+        return
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+    except BaseException:
+        connection.execute("ROLLBACK")
+        raise
+    connection.execute("COMMIT")
 
 
 def _keys_of(path: Path) -> Keys:
@@ -397,7 +391,3 @@ def _stem(name: str) -> str | None:
         if name.endswith(ending) and is_recording_id(stem := name.removesuffix(ending)):
             return stem
     return None
-
-
-def _int64(value: int) -> int:
-    return max(-_INT64_MAX, min(_INT64_MAX, value))

@@ -13,11 +13,6 @@ from rig.api.recordings import RecordingQuery, Sorting
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND: Final = timedelta(microseconds=1)
 _NEWEST: Final = "time_ns DESC, id DESC"
-#: The log before a part of a split recording, which is listed with the first one.
-_PART_BEFORE: Final = (
-    "SELECT 1 FROM recordings b WHERE b.path = substr(r.path, 1, length(r.path) - length(r.id || '.mcap')) "
-    "|| r.continues || '.mcap'"
-)
 _ORDERS: Final = {
     Sorting.NEWEST: _NEWEST,
     Sorting.OLDEST: "time_ns, id",
@@ -45,8 +40,8 @@ class Conditions:
         return " AND ".join(self.texts) or "TRUE"
 
 
-def found_paths(connection: sqlite3.Connection, query: RecordingQuery) -> tuple[int, list[str]]:
-    """How many recordings fit a query, and the paths of those on the page that it asks for, in its order.
+def found_recordings(connection: sqlite3.Connection, query: RecordingQuery) -> tuple[int, list[bytes]]:
+    """How many recordings fit a query, and the entries of those on the page that it asks for, in its order.
 
     Raises:
         BadInputError: its text cannot be understood.
@@ -54,12 +49,12 @@ def found_paths(connection: sqlite3.Connection, query: RecordingQuery) -> tuple[
     conditions = _of_recordings(query)
     where, values = conditions.where, conditions.values
     limit = -1 if query.limit is None else query.limit
-    listed = f"SELECT path FROM recordings r WHERE {where} ORDER BY {_ORDERS[query.sort]} LIMIT ? OFFSET ?"  # noqa: S608
-    paths = [row[0] for row in connection.execute(listed, (*values, limit, query.offset))]
-    if not query.offset and (query.limit is None or len(paths) < query.limit):
-        return len(paths), paths
+    listed = f"SELECT entry FROM recordings r WHERE {where} ORDER BY {_ORDERS[query.sort]} LIMIT ? OFFSET ?"  # noqa: S608
+    entries = [row[0] for row in connection.execute(listed, (*values, limit, query.offset))]
+    if not query.offset and (query.limit is None or len(entries) < query.limit):
+        return len(entries), entries
     (total,) = connection.execute(f"SELECT count(*) FROM recordings r WHERE {where}", values).fetchone()  # noqa: S608
-    return total, paths
+    return total, entries
 
 
 def found_jumps(connection: sqlite3.Connection, query: JumpQuery, columns: str) -> Sequence[tuple[Any, ...]]:
@@ -91,7 +86,6 @@ def found_jumps(connection: sqlite3.Connection, query: JumpQuery, columns: str) 
 def _of_recordings(query: RecordingQuery) -> Conditions:
     conditions, wanted = Conditions(), understood(query.search)
     conditions.add("deleted = ?", int(query.deleted))
-    conditions.add(f"(part = 1 OR NOT EXISTS ({_PART_BEFORE}))")
     _add_wanted(conditions, wanted)
     if wanted.figures:
         figures = " AND ".join(f"j.{column} {sign} ?" for column, sign, _ in wanted.figures)

@@ -2,7 +2,7 @@
 
 import os
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import accumulate
@@ -16,46 +16,44 @@ from rig.errors import BadInputError
 from rig.topics import RECORDING_METADATA, SESSION_METADATA
 
 
-def parts_of(log: Path) -> tuple[Path, ...]:
+def parts_of(log: Path, session: Callable[[Path], Mapping[str, str] | None] | None = None) -> tuple[Path, ...]:
     """All logs of a split recording that lie beside each other, in order; of another recording its one log.
 
     Args:
         log: any of them. None of those before or after a missing one is found.
+        session: gives the session fields that a log begins with, None if there is no such file; None: they are read.
     """
+    told = session or _session
     first, number = numbered(log)
-    if number == 1 and not os.path.lexists(named(first, 2, log)):
-        return (log,)
-    session = _session(log)
-    if session is None:
+    if number == 1 and told(named(first, 2, log)) is None:
         return (log,)
     found = [log]
-    while (before := _before(found[0])) is not None:
+    while (before := _before(found[0], told)) is not None:
         found.insert(0, before)
-    while (after := _after(found[-1])) is not None:
+    while (after := _after(found[-1], told)) is not None:
         found.append(after)
     return tuple(found)
 
 
-def _before(log: Path) -> Path | None:
+def _before(log: Path, told: Callable[[Path], Mapping[str, str] | None]) -> Path | None:
     """The part before a log, None if it is not there."""
-    session = _session(log) or {}
+    session = told(log) or {}
     if (number := part_number(session)) == 1:
         return None
-    told = log.with_name(f"{Path(session[CONTINUES]).name}{log.suffix}")
-    for path in (told, named(numbered(log)[0], number - 1, log)):  # they may all have been renamed
-        other = _session(path)
+    said = log.with_name(f"{Path(session[CONTINUES]).name}{log.suffix}")
+    for path in (said, named(numbered(log)[0], number - 1, log)):  # they may all have been renamed
+        other = told(path)
         if other is not None and path != log and _same(session, other) and part_number(other) < number:
             return path
     return None
 
 
-def _after(log: Path) -> Path | None:
+def _after(log: Path, told: Callable[[Path], Mapping[str, str] | None]) -> Path | None:
     """The part after a log, None if it is not there."""
-    session = _session(log) or {}
+    session = told(log) or {}
     first, number = numbered(log)
-    while os.path.lexists(path := named(first, number + 1, log)):
-        other = _session(path)
-        if other is not None and _same(session, other) and part_number(other) > part_number(session):
+    while (other := told(path := named(first, number + 1, log))) is not None:
+        if _same(session, other) and part_number(other) > part_number(session):
             return path
         number += 1  # another recording had this name when the part was made
     return None
@@ -65,12 +63,14 @@ def _same(one: Mapping[str, str], other: Mapping[str, str]) -> bool:
     return one.get("recording", "") == other.get("recording", "") != ""
 
 
-def _session(log: Path) -> dict[str, str] | None:
-    """The session fields that a log begins with; None: it is no log that can be read."""
+def _session(log: Path) -> Mapping[str, str] | None:
+    """The session fields that a log begins with, none if it cannot be read; None: there is no such file."""
+    if not os.path.lexists(log):
+        return None
     with suppress(BadInputError, OSError), LogReader(log, skim=True, links=False) as reader:
         next((item for item in reader.items(only=()) if isinstance(item, Chunk) or _told(reader)), None)
         return reader.metadata.get(SESSION_METADATA, {})
-    return None
+    return {}
 
 
 def _told(reader: LogReader) -> bool:

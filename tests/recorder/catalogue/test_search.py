@@ -1,5 +1,6 @@
 """What a search field understands, and what the catalogue finds by it."""
 
+import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import closing, suppress
 from datetime import UTC, datetime, timedelta
@@ -13,13 +14,16 @@ from recorder.catalogue.entry import Entry, LogState
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.log_index import FoundJump
 from recorder.catalogue.search_words import understood
+from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import write_session_changes
 from rig.api.athletes import JumpQuery
 from rig.api.jump import LastJump, MeasuredValue
 from rig.api.recordings import RecordingQuery
 from rig.api.statement import Level
+from rig.clocks import NS_PER_S
 from rig.errors import BadInputError
-from tests.recorder.logs import ALL_OK, write_log
+from tests.recorder.logs import ALL_OK, LOST, OK, PERIOD_NS, write_log
+from tests.recorder.split import split_log
 
 TIME = datetime(2026, 11, 21, 10, tzinfo=UTC)
 
@@ -134,6 +138,54 @@ def test_recordings_are_found(catalogue: Catalogue, text: str, found: str) -> No
     assert sorted(entry.id for entry in with_text.entries) == found.split()
     assert with_text.total == len(found.split())
     assert catalogue.find(RecordingQuery(search=text, limit=1)).total == with_text.total
+
+
+class _Strict:
+    """Only recordings without a lost frame are good."""
+
+    def level(self, entry: Entry) -> Level:
+        return Level.WARNING if entry.partial else Level.GOOD
+
+    def jumps(self, log: Path) -> Sequence[FoundJump]:
+        """Its angle stands beside the log."""
+        beside = measured_path(log) / "alpha"
+        values = [MeasuredValue(value=float(beside.read_text()), sigma=0.5)] if beside.exists() else []
+        return [
+            FoundJump(
+                LastJump(recording=log.stem, jump=1, time=TIME, ok=True, verdict="well", ski_to_body=value), False
+            )
+            for value in values
+        ]
+
+
+def test_a_split_recording_is_found_by_its_whole(tmp_path: Path) -> None:
+    """By how long it is and how good, whichever part makes it so, and by its jumps, which lie beside the first part."""
+    write_log(tmp_path / "whole.mcap", (*(ALL_OK,) * 8, (OK, LOST, OK), ALL_OK))
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    parts = split_log(tmp_path / "whole.mcap", folder / "r1.mcap", (4, 3))
+    measured_path(parts[0]).mkdir()
+    (measured_path(parts[0]) / "alpha").write_text("49")
+    longest = 8.5 * PERIOD_NS / NS_PER_S
+    with closing(Catalogue(folder, _Strict())) as catalogue:
+
+        def found(text: str) -> list[str]:
+            return [entry.id for entry in catalogue.find(RecordingQuery(search=text)).entries]
+
+        for text in (f"duration > {longest}", "verdict:warning", "alpha > 48", ""):
+            assert found(text) == ["r1"], text
+        assert (found(f"duration < {longest}"), found("verdict:good")) == ([], [])
+        renamed = [part.rename(part.with_name(part.name.replace("r1", "training"))) for part in parts]
+        assert found(f"duration > {longest}") == found("") == ["training"]
+        last = renamed[2].rename(tmp_path / renamed[2].name)
+        assert found("verdict:good") == ["training"]
+        assert found(f"duration > {longest}") == found("verdict:warning") == []
+        last.rename(renamed[2])
+        assert found("verdict:warning") == ["training"]
+        renamed[1].rename(tmp_path / renamed[1].name)
+        assert (sorted(found("")), found("verdict:warning")) == (["training", "training-part3"], ["training-part3"])
+        shutil.copy(renamed[2], folder / "copy.mcap")
+        assert sorted(found("")) == ["copy", "training", "training-part3"], "a copy of a part is listed"
 
 
 def test_jumps_are_found_one_by_one(catalogue: Catalogue) -> None:

@@ -16,6 +16,7 @@ from rig.api.cameras.aids import CameraAids
 from rig.api.cameras.balls import CameraBalls
 from rig.api.cameras.light import CameraLight, LightChange
 from rig.api.measuring import MeasuringQueue
+from rig.api.parts import PartsChange, PartsView
 from rig.api.recordings import Recording, RecordingOrder, SessionChange, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, Event, RigView, State, Status
@@ -38,6 +39,7 @@ from service.exports.jobs import Exports
 from service.jumpers.book import JumperBook
 from service.lights import Lights
 from service.measuring.queue import Measurings
+from service.parts import PartLimits
 from service.recordings.archive import Archive
 from service.recordings.describing import as_recording
 from service.recordings.measured_jumps import MeasuredJumps
@@ -94,6 +96,7 @@ class Service(Archive):
         rehearser: Rehearser,
         lights: Lights,
         trains: Trains,
+        parts: PartLimits,
         balls: BallPlaces,
         calibrating: CalibrationHelper,
         examine: Callable[[Status, bool | None], DoctorReport],
@@ -101,7 +104,8 @@ class Service(Archive):
         super().__init__(catalogue, exports, measurings, jumps)
         self._supervisor, self._jumpers, self._keeper = supervisor, jumpers, keeper
         self._slot, self._rehearser, self._examine = slot, rehearser, examine
-        self._lights, self._trains, self._balls, self._calibrating = lights, trains, balls, calibrating
+        self._lights, self._trains, self._parts = lights, trains, parts
+        self._balls, self._calibrating = balls, calibrating
         #: Whoever needs the cameras while the rig is idle holds `_idle` until he has them; `_examining`: as long as.
         self._idle, self._examining = threading.Lock(), threading.Lock()
         self._marks = Marks(supervisor, slot, self.status, self.start_recording)
@@ -298,6 +302,14 @@ class Service(Archive):
     def burst(self, order: BurstOrder) -> TriggerView:
         """Have so many pulses made."""
         return self._trains.burst(order.pulses)
+
+    def parts(self) -> PartsView:
+        """How recordings are split from the next one on."""
+        return self._parts.view()
+
+    def change_parts(self, change: PartsChange) -> PartsView:
+        """Change when a recording goes on in its next part, from the next recording on."""
+        return self._parts.change(change)
 
     def _index(self, camera: str) -> int:
         names = [each.name for each in self._supervisor.rig.cameras]

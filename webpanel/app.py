@@ -34,7 +34,7 @@ from webpanel.routes.measuring import measuring_router
 from webpanel.routes.observing import CountRequests, Metrics, observing_router
 from webpanel.routes.preview import cameras_router, preview_router
 from webpanel.routes.recordings import recordings_router, trash_router
-from webpanel.routes.rig import alarms_router, rig_router
+from webpanel.routes.rig import alarms_router, parts_router, rig_router
 from webpanel.routes.start_list import start_list_router
 
 
@@ -73,6 +73,7 @@ def create_app(
     door = Door(access, warn, links, Sessions() if sessions is None else sessions)
     routers = (
         rig_router(service),
+        parts_router(service),
         alarms_router(service),
         recordings_router(service, changes),
         start_list_router(service),

@@ -33,7 +33,7 @@ from recorder.catalogue.trash import (
 from recorder.catalogue.voice_notes import StoredVoice, add_voice_note, check_voice, voice_notes
 from recorder.log.session_changes import session_changes, write_session_changes
 from recorder.log.write_lock import is_being_written
-from recorder.reading.parts import RecordingReader
+from recorder.reading.parts import RecordingReader, parts_of
 from recorder.reading.records import FileWindow
 from recorder.reading.triplets import stored_image, tags
 from rig.api.athletes import JumpQuery
@@ -156,6 +156,14 @@ class Catalogue:
         path = self._path(recording)
         FileWindow(path, direct=False, links=False).close()
         return path
+
+    def first_part(self, recording: str) -> str:
+        """Id of the first part of the recording to which a log belongs; its own, if that is not split.
+
+        Raises:
+            UnknownRecordingError: no log has this id.
+        """
+        return parts_of(self._path(recording))[0].stem
 
     def tags(self, recording: str) -> tuple[TripletTag, ...]:
         """The tags of a recording, in the order of the log, without those in damaged parts.

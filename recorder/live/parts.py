@@ -53,8 +53,7 @@ class Parts:
 
     def __init__(self, assembler: Assembler) -> None:
         self._assembler = assembler
-        self._settings = assembler.rig.recorder
-        self._fallback = self._settings.fallback_directory
+        self._fallback = assembler.rig.recorder.fallback_directory
         self.earlier: list[Recording] = []
         self._closed: list[_Account] = []
         self._number = self._failures = 0
@@ -130,7 +129,7 @@ class Parts:
 
     def _is_full(self, present: Recording, time: HostNs, ahead_s: float) -> bool:
         """Whether a log is as large as a part may be at a time, or `ahead_s` later."""
-        lasts_s, part_s, part_gb = present.lasts_s(time), self._settings.part_s, self._settings.part_gb
+        lasts_s, (part_s, part_gb) = present.lasts_s(time), present.part_limits
         if lasts_s == 0.0:
             return False
         rate_hz = self._assembler.rig.trigger.rate_hz

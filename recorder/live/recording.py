@@ -414,6 +414,11 @@ class Recording:
             self._writer.set_metadata(SESSION_METADATA, self._session | self._after)
         self._writer.begin_close()
 
+    @property
+    def part_limits(self) -> tuple[float | None, float | None]:
+        """How long, s, and how large, 10^9 bytes, its log may become before it goes on in another one; None: any."""
+        return self._order.part_s, self._order.part_gb
+
     def continuation(self, path: Path, *, part: bool = False) -> StartRecording:
         """The order for a recording that continues this one in another log, which is its next `part` or not."""
         return msgspec.structs.replace(self._order, path=path, goes_on=None, part_of=self.id if part else "")

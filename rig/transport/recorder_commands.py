@@ -93,6 +93,8 @@ class StartRecording(Message):
         rig_toml: the rig file as it was read, attached to the log.
         calibration: calibration of the cameras; None: not known.
         goes_on: the recording that this one continues after the death of its recorder; None: it is a new one.
+        part_s: it goes on in another log, its next part, after so many seconds; None: whatever it lasts.
+        part_gb: the same before a log is larger than this, 10^9 bytes; None: however large.
         part_of: id of the recording of which the log is a later part; empty: it is the first one.
     """
 
@@ -107,6 +109,8 @@ class StartRecording(Message):
     rig_toml: str = ""
     calibration: Calibration | None = None
     goes_on: GoesOn | None = None
+    part_s: float | None = None
+    part_gb: float | None = None
     part_of: str = ""
 
     @property

@@ -93,14 +93,16 @@ class Archive(ArchiveResults, ArchiveNotes):
         return Trash(recordings=len(removed), bytes=sum(each.bytes for each in removed))
 
     def download(self, recording_id: str) -> Download:
-        """A recording that has ended, as a file with its corrected session.
+        """A log of a recording that has ended, as a file with the corrected session, which all parts have in common.
 
         Raises:
             StillRecordingError: it has not.
             BadInputError: the file may not be read, or is no regular file.
         """
         self._check_ended(recording_id)
-        return download_of(self._catalogue.entry(recording_id), self._catalogue.file(recording_id))
+        first = self._catalogue.first_part(recording_id)
+        session = self._catalogue.entry(first).session
+        return download_of(recording_id, session, self._catalogue.file(recording_id), self._catalogue.file(first))
 
     def start_export(self, recording_id: str, order: ExportOrder) -> ExportJob:
         """Ask for an export of a recording that has ended.

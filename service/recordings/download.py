@@ -10,7 +10,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from recorder.catalogue.entry import Entry
 from recorder.log.digitized_path import digitized_path
 from recorder.log.session_changes import session_changes
 from recorder.reading.corrected_log import corrected_log
@@ -30,25 +29,27 @@ _SUMS: Final = "SHA256SUMS"
 _LOCAL, _DESCRIPTOR, _CENTRAL, _ZIP64_MORE, _EXTRA, _END, _ZIP64_END = 30, 16, 46, 28, 4, 22, 76
 
 
-def download_of(entry: Entry, path: Path) -> Download:
-    """A recording as a file to take away.
+def download_of(recording: str, session: Mapping[str, str], path: Path, first: Path) -> Download:
+    """A log as a file to take away.
 
     Args:
-        entry: of the recording.
-        path: its log, which nobody writes any more.
+        recording: id of the log.
+        session: of the recording, with its changes; the names of all its parts are made of it.
+        path: the log, which nobody writes any more.
+        first: the first part of the recording, beside which the changes of the session lie; most have no other.
 
     Raises:
         BadInputError: the log cannot be read.
     """
     try:
-        changes = session_changes(path)
+        changes = session_changes(first)
     except BadInputError:  # the entry's verdict says so; the recording itself is as good as ever
         changes = {}
     log = corrected_log(path, changes)
     stat = log.status
     facts = (stat.st_ino, stat.st_mtime_ns, stat.st_size, sorted(changes.items()) if log.corrected else ())
     tag = hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
-    return Download(file_name(entry.id, entry.session), log.size, stat.st_mtime, tag, log.corrected, log.open)
+    return Download(file_name(recording, session), log.size, stat.st_mtime, tag, log.corrected, log.open)
 
 
 def file_name(recording: str, session: Mapping[str, str], ending: str = ".mcap") -> str:

@@ -7,6 +7,7 @@ from prometheus_client.metrics_core import Metric
 
 from rig.api.automatic import AutomaticChange, JumpMark, Marked
 from rig.api.export import ExportJob, ExportOrder
+from rig.api.parts import PartsChange, PartsView
 from rig.api.recordings import Recording, RecordingOrder, StopOrder
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, Event, RigView, Status
@@ -102,6 +103,14 @@ class RigService(Archive, Cameras, Protocol):
 
     def burst(self, order: BurstOrder) -> TriggerView:
         """Have so many pulses made. StateForbidsError: they run, or the rig is not armed, or others make them."""
+        ...
+
+    def parts(self) -> PartsView:
+        """How recordings are split from the next one on."""
+        ...
+
+    def change_parts(self, change: PartsChange) -> PartsView:
+        """Change when a recording goes on in its next part, keep that in the rig file. StorageError: not kept."""
         ...
 
     def events(self, after: int) -> list[Event]:

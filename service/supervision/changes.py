@@ -17,6 +17,7 @@ from service.supervision.messages import (
     Burst,
     ChangeCalibration,
     ChangeCamera,
+    ChangeParts,
     ChangeRate,
     ChangeRegion,
     Do,
@@ -90,6 +91,12 @@ def change_calibration(now: Situation, command: ChangeCalibration, _: Moment, do
         StateForbidsError: a recording runs, or the rig is being armed or disarmed.
     """
     _check_change(now, "calibrate")
+    do(Answer(command.answer, None))
+    return _use(now, command.new, do)
+
+
+def change_parts(now: Situation, command: ChangeParts, _: Moment, do: Do) -> Situation:
+    """Use other limits for the parts of a recording: each recording has those of its begin."""
     do(Answer(command.answer, None))
     return _use(now, command.new, do)
 

@@ -129,6 +129,7 @@ DECISIONS: Final[Mapping[type, Callable[[Situation, Any, Moment, m.Do], Situatio
         m.Burst: changes.burst,
         m.ChangeCamera: changes.change_camera,
         m.ChangeCalibration: changes.change_calibration,
+        m.ChangeParts: changes.change_parts,
         m.ChangeRate: changes.change_rate,
         m.ChangeRegion: changes.change_region,
         m.Note: _note,

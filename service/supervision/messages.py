@@ -117,6 +117,12 @@ class ChangeCalibration(Command[None], frozen=True):
     new: RigInUse
 
 
+class ChangeParts(Command[None], frozen=True):
+    """Use a rig with other limits for the parts of a recording, from the next recording on."""
+
+    new: RigInUse
+
+
 class ChangeRate(Command[None], frozen=True):
     """Use a rig with another rate of its pulses; if it is armed, or has a fault, it is armed anew."""
 

@@ -103,7 +103,11 @@ def begin(now: Situation, command: Begin, at: Moment, do: Do) -> Situation:
         StateForbidsError: not armed, or a recording is being opened.
     """
     _check_armed(now)
-    told = msgspec.structs.replace(command.start, rig_toml=now.in_use.toml, calibration=_fitting(now.in_use))
+    recorder = now.in_use.rig.recorder
+    told = msgspec.structs.replace(
+        command.start, rig_toml=now.in_use.toml, calibration=_fitting(now.in_use),
+        part_s=recorder.part_s, part_gb=recorder.part_gb,
+    )  # fmt: skip
     waiting = () if command.ended is None else (command.ended,)
     current = RecordingInProgress(
         told, command.session, at.utc, at.host, told.path, (told.path,), command.answer, waiting

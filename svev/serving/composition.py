@@ -42,6 +42,7 @@ from service.jumpers.keeper import Keeper
 from service.lights import Lights
 from service.measuring.queue import Measurings
 from service.offloading.releasing import Removal
+from service.parts import PartLimits
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.measured_jumps import LogJudge, MeasuredJumps
@@ -138,7 +139,7 @@ def serve(settings: ServiceSettings) -> None:
         service = Service(
             supervisor, jumpers, catalogue, exports,
             stack.enter_context(_measurings(data, supervisor, jumps, catalogue)), jumps,
-            keeper, slot, rehearser, lights, trains, balls,
+            keeper, slot, rehearser, lights, trains, PartLimits(supervisor, settings.rig), balls,
             stack.enter_context(closing(_calibrating(settings.rig, data, supervisor, slot))),
             PanelDoctor(lambda: supervisor.rig, data).report,
         )  # fmt: skip

@@ -22,6 +22,7 @@ from rig.api.cameras.balls import CameraBalls
 from rig.api.cameras.light import CameraLight, LightChange
 from rig.api.jump import LastJump
 from rig.api.measuring import MeasuringQueue
+from rig.api.parts import PartsChange, PartsView
 from rig.api.recordings import Counts, Recording, RecordingOrder, RecordingState, SessionChange, StopOrder
 from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals
 from rig.api.statement import Level, Statement
@@ -95,6 +96,7 @@ class MemoryService(Archive):
         through_the_lens: what the lens makes of the picture of a camera, set by tests.
         lights: exposure, gain and region of each camera.
         pulses_made: who makes the pulses.
+        split: when a recording goes on in its next part.
         bursts: pulses that were asked for.
         calibrating: what the calibration helper shows, set by tests.
         balls: where each camera should show the balls, set by tests.
@@ -127,6 +129,7 @@ class MemoryService(Archive):
         self.rehearsed: Rehearsal | None = None
         self.preview_calls = 0
         self.pulses_a_picture = 1
+        self.split = PartsView(part_s=None, part_gb=None, saved=True)
         self.pulses_made = TriggerView(
             source="gpio", rate_hz=30, controls=tuple(TriggerControl), running=True, saved=True
         )
@@ -366,6 +369,16 @@ class MemoryService(Archive):
         self.pulses_made = before.model_copy(update={"rate_hz": rate_hz, "saved": saved, "running": running})
         self._wake()
         return self.pulses_made
+
+    def parts(self) -> PartsView:
+        return self.split
+
+    def change_parts(self, change: PartsChange) -> PartsView:
+        limits = change.model_dump(include=change.model_fields_set & {"part_s", "part_gb"})
+        changed = self.split.model_copy(update=limits)
+        saved = change.save or (self.split.saved and changed == self.split)
+        self.split = changed.model_copy(update={"saved": saved})
+        return self.split
 
     def burst(self, order: BurstOrder) -> TriggerView:
         if self.pulses_made.running:

@@ -16,6 +16,7 @@ from webpanel.door.access import Access
 #: The calls of the contract, and those that the page needs beyond it.
 CALLS = {
     "GET /api/trigger", "PATCH /api/trigger", "POST /api/trigger/burst",
+    "GET /api/parts", "PATCH /api/parts",
     "POST /api/mark", "PUT /api/automatic",
     "GET /api/cameras/{camera}", "PATCH /api/cameras/{camera}",
     "GET /api/cameras/{camera}/aids", "GET /api/cameras/{camera}/balls",

@@ -52,7 +52,7 @@ def test_the_api_is_as_it_is_described(
         write_recording(service.catalogue.directory, f"jump-{number}", (ALL_OK, K2_LOST, ALL_OK))
     service.arm()
     said = schemathesis(panel.url, tmp_path, "--phases=coverage,fuzzing", "--max-examples=8")
-    assert "97 selected / 111 total" in said
+    assert "99 selected / 113 total" in said
     assert service.healthy()
 
 

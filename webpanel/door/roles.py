@@ -62,6 +62,7 @@ _ACTS: Final[tuple[tuple[str, Callable[..., Phrase]], ...]] = (
         lambda: phrase("act_calibration_saved", "put the calibration into the rig file"),
     ),
     (r"PATCH /api/trigger", lambda: phrase("act_trigger", "changed the pulses")),
+    (r"PATCH /api/parts", lambda: phrase("act_parts", "changed how recordings are split")),
     (r"POST /api/trigger/burst", lambda: phrase("act_burst", "asked for pulses")),
     (r"PUT /api/automatic", lambda: phrase("act_automatic", "changed whether recordings begin by themselves")),
     (

@@ -7,6 +7,7 @@ import anyio
 from anyio.to_thread import run_sync
 from fastapi import APIRouter, Path
 
+from rig.api.parts import PartsChange, PartsView
 from rig.api.rehearsal import RehearsalOrder, Rehearsals
 from rig.api.status import ArmOrder, DoctorReport, RigView, Status
 from rig.api.trigger import BurstOrder, TriggerChange, TriggerView
@@ -100,6 +101,26 @@ def rig_router(service: RigService) -> APIRouter:
     def end_rehearsal() -> Rehearsals:
         """End the rehearsal that runs, without a verdict; answers when the cameras are free."""
         return service.end_rehearsal()
+
+    return router
+
+
+def parts_router(service: RigService) -> APIRouter:
+    """The routes about the parts of long recordings."""
+    router = strict_router("Rig")
+
+    @router.get("/parts")
+    def get_parts() -> PartsView:
+        """When a recording goes on in another log, its next part."""
+        return service.parts()
+
+    @router.patch("/parts", responses=CHANGING)
+    def change_parts(change: PartsChange) -> PartsView:
+        """Change when a recording goes on in its next part, from the next recording on: one that runs goes on as it is.
+
+        `save` writes both limits into the rig file too; else they hold until the service ends.
+        """
+        return service.change_parts(change)
 
     return router
 

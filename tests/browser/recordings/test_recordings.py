@@ -18,6 +18,7 @@ from service.measuring.keeping import keep_result
 from tests.browser.conftest import MEASURED, Open, keep_measured, write_kinogram
 from tests.browser.views import assert_fits_a_phone, enter
 from tests.recorder.logs import ALL_OK
+from tests.recorder.split import split_log
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel
@@ -41,6 +42,26 @@ def few(service: MemoryService) -> None:
     write_recording(folder, "whole", (ALL_OK,) * 3, {"athlete": "Anna Berg", "bib": "17"}, ago_s=20)
     write_recording(folder, "partial", (LOST, ALL_OK), {"athlete": "Ola Lie", "bib": "4"}, ago_s=10)
     write_recording(folder, "empty", (), {"bib": "9"})
+
+
+def test_a_split_recording_is_taken_away_whole_or_part_by_part(
+    panel: Panel, service: MemoryService, open_page: Open, tmp_path: Path
+) -> None:
+    whole = write_recording(tmp_path, "whole", (ALL_OK,) * 9, {"athlete": "Anna Berg", "bib": "17"})
+    split_log(whole, service.catalogue.directory / "long.mcap", (4, 3))
+    page = open_page(f"{panel.url}/#/recordings/long", width=360, height=780, locale="nb-NO")
+    everything, single = page.locator("#recording-parts-all"), page.locator("#recording-parts")
+    expect(everything).to_have_text("Last ned alle 3 deler (ZIP)")
+    with page.expect_download() as taken:
+        everything.click()
+    with zipfile.ZipFile(taken.value.path()) as archive:
+        logs = [name for name in archive.namelist() if name.endswith(".mcap")]
+    assert logs == [f"17_Anna-Berg_long{part}.mcap" for part in ("", "-part2", "-part3")]
+    single.locator("summary").click()
+    with page.expect_download() as taken:
+        single.get_by_role("link", name="Del 2").click()
+    assert taken.value.suggested_filename == "17_Anna-Berg_long-part2.mcap"
+    assert_fits_a_phone(page)
 
 
 @pytest.mark.usefixtures("many")

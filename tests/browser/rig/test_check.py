@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 import pytest
 from playwright.sync_api import Page, expect
 
+from rig.api.parts import PartsView
 from rig.api.recordings import RecordingOrder
 from rig.api.rehearsal import Rehearsal, RehearsalOrder, Rehearsals, RehearsalVerdict
 from rig.api.statement import Level, Statement
@@ -140,6 +141,33 @@ def test_the_rate_of_the_pulses_is_changed_and_kept_and_they_are_stopped_and_sta
     service.start_recording(RecordingOrder())
     expect(page.locator("#pulses-slower")).to_be_disabled()
     expect(said).to_have_text("Ikke mens et opptak går.")
+
+
+def test_recordings_are_split_from_the_next_one_on(panel: Panel, service: MemoryService, open_page: Open) -> None:
+    page = open_page(f"{panel.url}/#/doctor", width=360, height=780, locale="nb-NO")
+    seconds, size, use, save, said = (
+        page.locator(f"#parts-{name}") for name in ("part_s", "part_gb", "use", "save", "said")
+    )
+    expect(said).to_have_text("Riggfilen sier det samme.")
+    expect(seconds).to_have_attribute("placeholder", "aldri")
+    expect(use).to_be_disabled()
+    size.fill("4")
+    expect(said).to_have_text("Ikke tatt i bruk ennå.")
+    use.click()
+    expect(said).to_contain_text("lagre det")
+    assert service.split == PartsView(part_s=None, part_gb=4.0, saved=False)
+    seconds.fill("600")
+    size.fill("")
+    use.click()
+    expect(use).to_be_disabled()
+    save.click()
+    expect(said).to_have_text("Riggfilen sier det samme.")
+    assert service.split == PartsView(part_s=600.0, part_gb=None, saved=True)
+    seconds.fill("0")
+    use.click()  # the browser refuses it
+    assert service.split.part_s == 600.0
+    assert_fits_a_phone(page)
+    assert page.evaluate(BROKEN) == []
 
 
 def test_another_region_is_used_and_kept_and_calibrations_that_do_not_fit_are_said(

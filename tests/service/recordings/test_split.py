@@ -79,6 +79,32 @@ def test_a_recording_is_split_between_pulses(tmp_path: Path, loopback: Loopback,
     assert (entry.id, entry.pulses, entry.parts) == (logs[0].stem, 150, tuple(log.stem for log in logs))
 
 
+def test_limits_are_changed_while_armed_and_kept_in_the_rig_file(tmp_path: Path, loopback: Loopback) -> None:
+    """They hold from the next recording on, not for one that runs."""
+    rig = _rig(tmp_path, loopback)
+    with serving(tmp_path, rig, loopback) as service:
+        service.arm()
+        assert service.get("/api/parts") == {"part_s": None, "part_gb": None, "saved": True}
+        running = service.post("/api/recordings", {"preroll_s": 0})["id"]
+        _, now = service.call("PATCH", "/api/parts", {"part_s": 1})
+        assert now == {"part_s": 1.0, "part_gb": None, "saved": False}
+        service.await_pulses(45)
+        service.post(f"/api/recordings/{running}/stop")
+        split = service.post("/api/recordings", {"preroll_s": 0})["id"]
+        service.await_pulses(45)
+        service.post(f"/api/recordings/{split}/stop")
+        listed = {each["id"]: len(each["parts"]) for each in service.get("/api/recordings")}
+        assert listed[running] == 1
+        assert listed[split] > 1
+        _, now = service.call("PATCH", "/api/parts", {"part_gb": 4, "part_s": 600, "save": True})
+        assert now == {"part_s": 600.0, "part_gb": 4.0, "saved": True}
+        _check_whole(service.data / f"{split}.mcap", info(service.data / f"{split}.mcap", whole=True).ledger.pulses)
+        attached = service.get("/api/rig")["toml"]
+    kept = load_rig(rig).recorder
+    assert (kept.part_s, kept.part_gb, kept.reserve_gb) == (600, 4, 0)
+    assert attached == rig.read_text()
+
+
 @pytest.mark.long
 def test_a_disk_that_lets_no_part_be_made_costs_no_pulse(tmp_path: Path, loopback: Loopback, disk: FaultyDisk) -> None:
     recording = _record(_rig(tmp_path, loopback), tmp_path / "logs", 6, "--part-s", "1.5", disk=disk)

@@ -5,6 +5,7 @@ import contextlib
 import hashlib
 import io
 import zipfile
+from pathlib import Path
 from urllib.parse import quote
 
 import cv2
@@ -14,8 +15,11 @@ import pytest
 
 from recorder.checking.verify import Verdict, verify
 from recorder.reading.info import info
+from recorder.reading.parts import parts_of
+from recorder.reading.triplets import tags
 from rig.frame import FrameStatus
 from tests.recorder.logs import ALL_OK, make_image, make_tag
+from tests.recorder.split import split_log
 from tests.webpanel.memory_service import SHAPE, MemoryService, write_recording
 from tests.webpanel.serving import Panel, refused
 
@@ -167,6 +171,25 @@ def test_the_checksum_is_that_of_the_file_as_it_comes(client: httpx.Client) -> N
         digest = hashlib.sha256(content.content)
         assert said.text == f"{digest.hexdigest()}  {'5_' if change else ''}jump.mcap\n"
         assert content.headers["repr-digest"] == f"sha-256=:{base64.b64encode(digest.digest()).decode()}:"
+
+
+def test_a_split_recording_comes_with_all_its_parts(
+    client: httpx.Client, service: MemoryService, tmp_path: Path
+) -> None:
+    """Each under the corrected name, so that programs find them beside each other."""
+    whole = write_recording(tmp_path, "whole", (ALL_OK,) * 9)
+    split_log(whole, service.catalogue.directory / "long.mcap", (4, 3))
+    client.patch("/api/recordings/long", json={"bib": "17", "athlete": "Åse Lie"})
+    answer = client.get("/api/recordings.zip?ids=long")
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert len(answer.content) == int(answer.headers["content-length"])
+        archive.extractall(tmp_path / "taken")
+    logs = [tmp_path / "taken" / f"17_Åse-Lie_long{part}.mcap" for part in ("", "-part2", "-part3")]
+    assert [*tags(logs[1])] == [*tags(whole)]
+    for log, name in zip(logs, ("long", "long-part2", "long-part3"), strict=True):
+        assert parts_of(log) == tuple(logs)
+        assert info(log).session["athlete"] == "Åse Lie"
+        assert client.get(f"/api/recordings/{name}/file").content == log.read_bytes()
 
 
 def test_several_recordings_come_as_one_archive(client: httpx.Client, service: MemoryService) -> None:

@@ -1,7 +1,7 @@
 /** The view of one recording: its triplets (scrubber.js), session fields, facts, download, delete. */
 
 import { say, t } from "../i18n/i18n.js";
-import { call, partOf, Problem, recordingPath } from "../shared/api.js";
+import { archiveOf, call, partOf, Problem, recordingPath } from "../shared/api.js";
 import { hear } from "../shared/connection.js";
 import { $, fillList, icon, make, makeMark, setText } from "../shared/dom.js";
 import { makeFields, writeFields } from "../shared/fields.js";
@@ -159,11 +159,25 @@ export function draw() {
   writeFields($("recording-session"), session);
   drawFacts(recording);
   const buttons = isRunning() ? [] : [
-    make("a", { class: "button primary", href: partOf(id, "file"), download: "" }, icon("download"), make("span", {}, t("recording.download"))),
+    ...makeDownloads(recording),
     recording.deleted || empty ? null : make("a", { class: "button", id: "recording-digitize", href: `./digitize.html?recording=${encodeURIComponent(id)}`, "data-needs": "operate" }, icon("zoom-in"), make("span", {}, t("digitize.link"))),
     recording.deleted ? makeButton("restore", t("trash.restore"), restoreShown) : makeButton("trash", t("recording.delete"), deleteShown),
   ];
   $("recording-buttons").replaceChildren(...buttons.filter((button) => button !== null));
+}
+
+/**
+ * Links to the log; of a split recording to all of its logs together, and to each.
+ *
+ * @param {Recording} shown
+ */
+function makeDownloads({ id, parts }) {
+  if (parts.length < 2) return [make("a", { class: "button primary", href: partOf(id, "file"), download: "" }, icon("download"), make("span", {}, t("recording.download")))];
+  const each = parts.map((part, place) => make("a", { class: "button", href: partOf(part, "file"), download: "" }, icon("download"), make("span", {}, t("recording.part", { part: place + 1 }))));
+  return [
+    make("a", { class: "button primary", id: "recording-parts-all", href: archiveOf([id]), download: "" }, icon("download"), make("span", {}, t("recording.all_parts", { count: parts.length }))),
+    make("details", { class: "parts", id: "recording-parts" }, make("summary", {}, t("recording.single_parts")), make("p", { class: "hint" }, t("recording.parts_hint")), make("div", { class: "buttons" }, ...each)),
+  ];
 }
 
 /**

@@ -1,7 +1,7 @@
 /** Several recordings are chosen, and downloaded, deleted, restored or removed together. */
 
 import { t } from "../i18n/i18n.js";
-import { partOf } from "../shared/api.js";
+import { archiveOf, partOf } from "../shared/api.js";
 import { $, make, setText } from "../shared/dom.js";
 import { size } from "../shared/format.js";
 import { place } from "../shared/router.js";
@@ -79,7 +79,7 @@ export function drawSelection() {
   const possible = those.length > 0 && those.length <= MOST_TOGETHER;
   link.classList.toggle("off", !possible);
   if (!possible) link.removeAttribute("href");
-  else link.href = those.length === 1 ? partOf(those[0].id, "file") : `./api/recordings.zip?ids=${those.map(({ id }) => encodeURIComponent(encodeURIComponent(id))).join(",")}`;
+  else link.href = those.length === 1 && those[0].parts.length < 2 ? partOf(those[0].id, "file") : archiveOf(those.map(({ id }) => id));
 }
 
 /** @param {(those: Recording[]) => Promise<void>} action */

@@ -129,6 +129,15 @@ export function recordingPath(id, part = "") {
 }
 
 /**
+ * Address of several recordings as one archive, with all their parts.
+ *
+ * @param {string[]} ids
+ */
+export function archiveOf(ids) {
+  return `./api/recordings.zip?ids=${ids.map((id) => encodeURIComponent(encodeURIComponent(id))).join(",")}`;
+}
+
+/**
  * Address of a part of a recording, for images and links.
  *
  * @param {string} id

@@ -23,16 +23,22 @@ from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import stored_triplets
 from rig.clocks import NS_PER_S
 from rig.errors import BadInputError
+from tests.analysis.measured import FIRST_DAY, PULSES
+from tests.analysis.simulated import training
 from tests.capture.rigs import write_rig
 from tests.service.serving import Serving, serving
+from tests.support.kept import kept_hill_log
 from tests.support.loopback import Loopback
 from tests.support.recorded_disk import History, RecordedDisk, lay_out
+from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.long
 
 _CUTS: Final = 500
 #: After every fifth one the recordings are listed, by the catalogue and anew.
 _LISTED: Final = 5
+_MARKS: Final = ".jsonl"
+_MEASURED_S: Final = 300.0
 _OLD_NS: Final = NS_PER_S
 #: Longer than that: whoever did something, and nothing since, finds it after a cut.
 _PAUSE_S: Final = 1.5
@@ -160,3 +166,75 @@ def _wrongly_listed(left: Path) -> Iterator[str]:
             yield "the catalogue is not what the logs say"
     finally:
         again.close()
+
+
+def _is_kept(name: str) -> bool:
+    """Whether a file is the rig file or a result, and neither one in the making nor marks, which are told by lines."""
+    return not any(part.startswith(".") for part in Path(name).parts) and not name.endswith(_MARKS)
+
+
+def _act_on_a_jump(service: Serving, recording: str) -> None:
+    """Keep settings in the rig file, mark by hand, have the jump measured, correct its name, mark again."""
+    for seconds in (600, 900, 1200):
+        service.call("PATCH", "/api/parts", {"part_s": seconds, "save": True})
+        time.sleep(_PAUSE_S / 3)
+    _mark(service, recording, 10)
+    assert service.call("POST", f"/api/recordings/{recording}/measurement")[0] == 202
+    _await_measured(service, recording)
+    time.sleep(_PAUSE_S)
+    service.call("PATCH", f"/api/recordings/{recording}", {"athlete": "Kari Nordmann"})
+    service.call("PATCH", "/api/parts", {"part_s": None, "part_gb": 4, "save": True})
+    _mark(service, recording, 30)
+    time.sleep(_PAUSE_S)
+
+
+def _mark(service: Serving, recording: str, first: int) -> None:
+    base = f"/api/recordings/{recording}/digitizing"
+    assert service.get(base)["cameras"]
+    for number in range(12):
+        action = {"do": "place", "pulse": first + number, "camera": "K1", "thing": "P1", "xy": [200.5, 100.0 + number]}
+        status, answer = service.call("POST", f"{base}/sessions/Anna/actions", action)
+        assert status == 200, answer
+        time.sleep(_PAUSE_S / 12)
+    assert service.call("POST", f"{base}/sessions/Anna/actions", {"do": "undo"})[0] == 200
+
+
+def _await_measured(service: Serving, recording: str) -> None:
+    def is_done() -> bool:
+        return bool(service.get(f"/api/recordings/{recording}/measurement")["state"] == "done")
+
+    wait_until(is_done, "it is measured", _MEASURED_S)
+
+
+@pytest.mark.alone
+@pytest.mark.timeout(900)
+def test_rig_file_marks_and_results_outlive_a_power_cut(tmp_path: Path, loopback: Loopback) -> None:
+    root, notes = tmp_path / "disk", tmp_path / "notes"
+    (root / "data").mkdir(parents=True)
+    notes.mkdir()
+    jump = kept_hill_log(training(), PULSES, FIRST_DAY)
+    recording = jump.path.stem
+    shutil.copy(jump.path, root / "data")
+    rig = _rig(root, loopback)
+    rig.write_text(f'{rig.read_text()}[analysis]\nsurvey = "{jump.survey}"\n')
+    disk = RecordedDisk(notes, root)
+    prefix = ("env", *(f"{name}={value}" for name, value in disk.environment.items()))
+    with serving(tmp_path, rig, loopback, prefix=prefix, data=root / "data") as service:
+        _act_on_a_jump(service, recording)
+    history = disk.history()
+    last = {name: content for name, content in history.seen(history.calls[-1].end).items() if _is_kept(name)}
+    assert last == {name: (root / name).read_bytes() for name in last}, "all that was done is recorded"
+    marks = f"data/{recording}.digitized/Anna{_MARKS}"
+    assert {rig.name, f"data/{recording}.measured/jumper.json"} <= {*last}
+    draw, found = random.Random(13), dict[str, list[str]]()
+    begin, end_ns = history.calls[0].time_ns, history.calls[-1].time_ns
+    for cut in range(_CUTS):
+        moment = draw.choice(history.calls).time_ns if cut % 2 else draw.randrange(begin, end_ns + _OLD_NS)
+        before, end = history.at(moment - _OLD_NS), history.at(moment)
+        left = history.after_cut(end, draw)
+        lost = [name for name, all_ in history.versions(before, end, _is_kept).items() if left.get(name) not in all_]
+        if not left.get(marks, b"").startswith(history.seen(before).get(marks, b"")):
+            lost.append(marks)
+        if lost:
+            found[f"cut {(moment - begin) / NS_PER_S:.3f} s after the beginning"] = lost
+    assert not found, f"{len(found)} of {_CUTS} cuts: {json.dumps(found, indent=1)[:5000]}"

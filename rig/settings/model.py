@@ -177,11 +177,21 @@ class AnalysisSettings(StrictModel):
 
 
 class OffloadSettings(StrictModel):
-    """Copies of all recordings on another disk, made when nothing is recorded."""
+    """Copies of all recordings on another disk or in an object store, made when nothing is recorded."""
 
-    to: Path = Field(
+    to: Path | None = Field(
+        None,
         description="folder on another disk, a USB stick or a share that every recording is copied to with all that "
-        "belongs to it, relative to the working directory"
+        "belongs to it, relative to the working directory",
+    )
+    store: str | None = Field(
+        None,
+        pattern=r"^[a-z][a-z0-9]*://.+",
+        description="in place of `to`: where in an object store, for example s3://bucket/jumps; fsspec and its package "
+        "for such addresses (s3fs, gcsfs) reach it, with the keys that these find in the environment",
+    )
+    store_options: dict[str, str | bool | int] = Field(
+        {}, description="options of that package, for example endpoint_url; no keys: the rig file stands in every log"
     )
     keep_days: float | None = Field(
         None,
@@ -195,6 +205,19 @@ class OffloadSettings(StrictModel):
         description="the oldest recordings that are safe in that folder go into the trash while less than this is free "
         "here, 10^9 bytes; what lies in the trash counts as free",
     )
+
+    @model_validator(mode="after")
+    def _one_place(self) -> "OffloadSettings":
+        if (self.to is None) == (self.store is None):
+            raise ValueError("set either to, a folder, or store, an address in an object store")
+        if self.store is not None and self.store.startswith(("file:", "local:", "memory:")):
+            raise ValueError(f"{self.store} is in no object store: set to, a folder")
+        return self
+
+    @property
+    def place(self) -> str:
+        """Where the copies are."""
+        return self.store or str(self.to)
 
     @property
     def releases(self) -> bool:

@@ -18,13 +18,13 @@ from rig.events import Event
 from rig.events import Level as EventLevel
 from rig.host.files import make_folder
 from rig.phrase import Phrase, phrase, plain
-from rig.settings.model import AnalysisSettings
+from rig.settings.model import AnalysisSettings, OffloadSettings
 from service.measuring.keeping import keep_file, keep_problem, keep_renamed, keep_result, keep_step
 from service.measuring.program import Figures, Measure, Measured, NotMeasured, Rename, Whole
 from service.measuring.results import VIDEO, names_of
 from service.measuring.retries import source_mark
-from service.offloading.copying import Copy
 from service.offloading.notes import CopyNotes, as_warning, mark_of
+from service.offloading.orders import PROGRAM, copying
 
 #: Where results are made, before they are whole.
 _WORKSHOP: Final = ".measuring"
@@ -143,13 +143,13 @@ class AfterSteps:
             shutil.rmtree(made, ignore_errors=True)
         return True
 
-    def copy(self, recording: str, log: Path, to: Path) -> None:
+    def copy(self, recording: str, log: Path, offload: OffloadSettings) -> None:
         """Copy a log, measured or not, with its files; a failure is noted, and an event tells of it."""
         self._hear(Progress(step=MeasuringStep.COPYING, share=0.0))
         mark, why = mark_of(log), None
-        order = Copy(paths=(log, *beside(log)), to=to)
+        order = copying((log, *beside(log)), offload)
         try:
-            end = self._child(recording, "service.offloading.copying", order, Progress | End, self._hear)
+            end = self._child(recording, PROGRAM, order, Progress | End, self._hear)
             if end is None or not log.exists():
                 return
             if isinstance(end, Failed):

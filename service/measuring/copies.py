@@ -1,7 +1,7 @@
 """The recordings that wait to be copied to the other disk, which `[offload]` of the rig file names."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -15,6 +15,8 @@ from service.offloading.notes import CopyNotes
 
 #: So often recordings are looked for that are not on the other disk.
 _UNCOPIED_LOOK_S: Final = 300.0
+#: What is told of several logs, the first that holds of one.
+_TOLD: Final = (MeasuringState.MEASURING, MeasuringState.FAILED, MeasuringState.WAITING, MeasuringState.DONE)
 
 
 class Copies:
@@ -34,7 +36,7 @@ class Copies:
         self._folder, self._in_use = folder, in_use
         self.waiting = WaitingLogs()  # kept in no file: the notes tell what is copied
         self.notes = CopyNotes(folder, tell)
-        self._looked: tuple[Path, float] | None = None
+        self._looked: tuple[str, float] | None = None
 
     def want(self, recording: str) -> None:
         """Let a recording wait, if the rig file asks for copies."""
@@ -45,32 +47,38 @@ class Copies:
     def look(self) -> None:
         """Let recordings wait that are not on the other disk as they are: now and then, and when that disk comes."""
         offload = self._in_use().offload
-        if offload is None or not offload.to.is_dir():
+        if offload is None or not (offload.to is None or offload.to.is_dir()):
             self._looked = None
             return
         now = time.monotonic()
-        if self._looked is not None and self._looked[0] == offload.to and now - self._looked[1] < _UNCOPIED_LOOK_S:
+        if self._looked is not None and self._looked[0] == offload.place and now - self._looked[1] < _UNCOPIED_LOOK_S:
             return
-        self._looked = offload.to, now
+        self._looked = offload.place, now
         for log in sorted(self._folder.glob("*.mcap")):
             if not self.notes.is_copied(log):
                 self.want(log.stem)
 
-    def step(self, recording: str, running: MeasuringQueue | None) -> tuple[StepState, ...]:
+    def step(self, logs: Sequence[str], running: MeasuringQueue | None) -> tuple[StepState, ...]:
         """How far the copy of a recording is; nothing where none is made.
 
         Args:
-            recording: its id.
+            logs: ids of all its logs.
             running: what is at work.
         """
-        note, problem = self.notes.of(recording), None
-        if running is not None and (running.recording, running.step) == (recording, MeasuringStep.COPYING):
+        steps = [step for log in logs if (step := self._step(log, running)) is not None]
+        if any(step.state is MeasuringState.DONE for step in steps) and len(steps) < len(logs):
+            steps.append(StepState(step=AfterStep.COPY, state=MeasuringState.WAITING))  # the others have yet to be seen
+        return tuple(sorted(steps, key=lambda step: _TOLD.index(step.state))[:1])
+
+    def _step(self, log: str, running: MeasuringQueue | None) -> StepState | None:
+        note, problem = self.notes.of(log), None
+        if running is not None and (running.recording, running.step) == (log, MeasuringStep.COPYING):
             state = MeasuringState.MEASURING
-        elif recording in self.waiting:
+        elif log in self.waiting:
             state = MeasuringState.WAITING
         elif note is None:
-            return ()
+            return None
         else:
             problem = note.problem
             state = MeasuringState.DONE if problem is None else MeasuringState.FAILED
-        return (StepState(step=AfterStep.COPY, state=state, problem=problem),)
+        return StepState(step=AfterStep.COPY, state=state, problem=problem)

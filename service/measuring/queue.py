@@ -13,6 +13,7 @@ from typing import Final
 
 from analysis.result.naming import CAMERAS
 from recorder.log.measured_path import measured_path
+from recorder.reading.parts import parts_of
 from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringQueue
 from rig.api.statement import Level, Statement
@@ -130,7 +131,7 @@ class Measurings:
             refused = Statement(level=Level.INFO, code="no_analysis", text=what, advice=advice)
             known = known.model_copy(update={"refused": refused})
         found = in_queue(known, ids, running, self._now.figures, analysis)
-        copy = self._queues.copies.step(recording, running)
+        copy = self._queues.copies.step([part.stem for part in parts_of(log)], running)
         return found.model_copy(update={"steps": (*found.steps, *copy)})
 
     @property
@@ -193,16 +194,16 @@ class Measurings:
 
     def _release(self) -> bool:
         """Release a recording that is safe on the other disk, if there is one to be released."""
-        log = None if self._busy() else self._releasing.next()
-        if log is not None:
-            self._releasing.release(log, self._busy, self._is_idle)
-        return log is not None
+        logs = None if self._busy() else self._releasing.next()
+        if logs is not None:
+            self._releasing.release(logs, self._busy, self._is_idle)
+        return logs is not None
 
     def _copy(self, recording: str) -> None:
         queues, offload = self._queues, self._in_use().offload
         with self._now.on(recording, queues.copies.waiting):
             if offload is not None:  # else another rig file, since it was queued
-                self._after.copy(recording, queues.log(recording), offload.to)
+                self._after.copy(recording, queues.log(recording), offload)
             if self._wanted(recording):
                 queues.copies.waiting.remove(recording)
 

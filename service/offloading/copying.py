@@ -10,28 +10,16 @@ from pathlib import Path
 from typing import Final
 
 from rig.api.measuring import MeasuringStep
-from rig.background.messages import End, Order, Progress
+from rig.background.messages import End, Progress
 from rig.background.program import Teller, serve
 from rig.errors import StorageError
 from rig.host.disk import ask_free_bytes, replace_file, sync
 from rig.phrase import phrase
-from service.offloading.verified_copy import checksum, copy_file, sum_of
+from service.offloading.orders import Confirm, ConfirmUpload, Copy, Upload
+from service.offloading.uploading import confirm_upload, upload
+from service.offloading.verified_copy import checksum, copy_file, files_of, sum_line, sum_of
 
 _LOG: Final = ".mcap"
-
-
-class Copy(Order):
-    """Copy files and folders into the folder `to`, each whole or absent; what is there already stays."""
-
-    paths: tuple[Path, ...]
-    to: Path
-
-
-class Confirm(Order):
-    """Compare a log, its copy and the checksum beside the copy; if they differ, the copy loses its checksum."""
-
-    log: Path
-    copy: Path
 
 
 def _copy(asked: Copy, tell: Teller) -> End:
@@ -40,7 +28,7 @@ def _copy(asked: Copy, tell: Teller) -> End:
         text = "{folder}: the folder for copies is not there; connect its disk, and the copy is made"
         raise StorageError(phrase("copying_no_folder", text, folder=str(to)))
     wanted = [source for source in asked.paths if source.exists() and not _is_copied(source, to / source.name)]
-    sizes = sum(path.stat().st_size for source in wanted for path in _files(source))
+    sizes = sum(path.stat().st_size for source in wanted for path in files_of(source))
     there = sum(part.stat().st_size for source in wanted if (part := _part(source, to)).is_file())
     if ask_free_bytes(to) < sizes - there:
         raise StorageError(
@@ -84,7 +72,7 @@ def _copy_one(source: Path, to: Path, told: Callable[[int], None]) -> None:
     if part.is_dir():
         shutil.rmtree(part)
     digest = ""
-    for path in _files(source):
+    for path in files_of(source):
         copy = part / path.relative_to(source) if source.is_dir() else part
         copy.parent.mkdir(parents=True, exist_ok=True)
         digest = copy_file(path, copy, told)
@@ -108,7 +96,7 @@ def _accept(source: Path, target: Path, told: Callable[[int], None]) -> None:
 
 
 def _keep_sum(target: Path, digest: str) -> None:
-    replace_file(sum_of(target), f"{digest}  {target.name}\n".encode(), links=False)
+    replace_file(sum_of(target), sum_line(digest, target.name), links=False)
 
 
 def _is_copied(source: Path, target: Path) -> bool:
@@ -133,12 +121,6 @@ def _part(source: Path, to: Path) -> Path:
     return to / f".{source.name}.part"
 
 
-def _files(source: Path) -> list[Path]:
-    if not source.is_dir():
-        return [source]
-    return [path for path in sorted(source.rglob("*")) if path.is_file() and not path.is_symlink()]
-
-
 def _rename(part: Path, target: Path) -> None:
     """Give what was copied its name, in place of what had it."""
     if target.is_dir():
@@ -148,7 +130,7 @@ def _rename(part: Path, target: Path) -> None:
 
 def main() -> None:
     """Copy, or confirm a copy."""
-    serve({Copy: _copy, Confirm: _confirm})
+    serve({Copy: _copy, Confirm: _confirm, Upload: upload, ConfirmUpload: confirm_upload})
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
 """Puts recordings into the trash that are safe on the other disk, if a rule of the rig file says so."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from recorder.reading.parts import parts_of
 from rig.background.child import run_child
 from rig.background.messages import End, Failed
 from rig.errors import SvevError
@@ -13,8 +14,8 @@ from rig.events import Event, Level
 from rig.host.disk import free_bytes
 from rig.phrase import Phrase, phrase, plain
 from rig.settings.model import OffloadSettings, RigSettings
-from service.offloading.copying import Confirm
 from service.offloading.notes import CopyNotes, as_warning, mark_of
+from service.offloading.orders import PROGRAM, confirming
 from service.offloading.verified_copy import sum_of
 
 _RULES_LOOK_S: Final = 60.0
@@ -60,75 +61,85 @@ class Releasing:
         self._removal, self._tell = removal, tell
         self._next_look = time.monotonic()
 
-    def next(self) -> Path | None:
-        """The log that is to be released now: the oldest one that a rule lets go, and whose copy is there."""
+    def next(self) -> tuple[Path, ...] | None:
+        """The logs of the recording that is to be released now: the oldest one that a rule lets go, and that is safe.
+
+        A split recording is released whole, when all its parts are safe and old enough.
+        """
         offload = self._in_use().offload
         if offload is None or not offload.releases or time.monotonic() < self._next_look:
             return None
-        for log in self._let_go(offload):
-            if self._is_safe(log, offload.to / log.name):
-                return log
+        for logs in self._let_go(offload):
+            if all(self._is_safe(log, offload) for log in logs):
+                return logs
         self._next_look = time.monotonic() + _RULES_LOOK_S
         return None
 
-    def release(self, log: Path, busy: Callable[[], bool], wanted: Callable[[], bool]) -> None:
-        """Read a log and its copy once more and, if they are the same, put the log into the trash.
+    def release(self, logs: Sequence[Path], busy: Callable[[], bool], wanted: Callable[[], bool]) -> None:
+        """Read the logs of a recording and their copies once more and, if they are the same, put it into the trash.
 
         Args:
-            log: it.
+            logs: they, in order.
             busy: whether to stand still.
             wanted: whether to go on at all.
         """
         offload = self._in_use().offload
         if offload is None:
             return
-        order = Confirm(log=log, copy=offload.to / log.name)
+        log = logs[0]
         try:
-            end = run_child("service.offloading.copying", order, End, busy=busy, wanted=wanted)
-            if end is None:
+            for log in logs:
+                end = run_child(PROGRAM, confirming(log, offload), End, busy=busy, wanted=wanted)
+                if end is None:
+                    return
+                if isinstance(end, Failed):
+                    self._kept(log, end.said)
+                    return
+            if not all(self._notes.is_copied(log) for log in logs):  # changed meanwhile
                 return
-            if isinstance(end, Failed):
-                self._kept(log, end.said)
-                return
-            if not self._notes.is_copied(log):  # changed meanwhile
-                return
-            self._removal.delete(log.stem)
+            for log in reversed(logs):  # what is left after a failure is the beginning
+                self._removal.delete(log.stem)
         except SvevError as error:
             self._kept(log, error.said)
         except OSError as error:
             self._kept(log, plain(str(error)))
         else:
             text = "{recording} is released: it lies in {folder}, and here in the trash"
-            said = phrase("event_released", text, recording=log.stem, folder=str(offload.to))
+            said = phrase("event_released", text, recording=logs[0].stem, folder=offload.place)
             self._tell(Event.now(Level.INFO, "service", said))
 
-    def _let_go(self, offload: OffloadSettings) -> list[Path]:
-        """The logs that the rules let go, the oldest first."""
-        times = {}
+    def _let_go(self, offload: OffloadSettings) -> list[tuple[Path, ...]]:
+        """The logs of each recording that the rules let go, the oldest first: by what was written last of it."""
+        times: dict[tuple[Path, ...], float] = {}
         for log in self._folder.glob("*.mcap"):
+            logs = parts_of(log)
             try:
-                times[log] = log.stat().st_mtime
+                times[logs] = max(each.stat().st_mtime for each in logs)
             except FileNotFoundError:
                 continue
-        logs = sorted(times, key=lambda log: (times[log], log.name))
+        found = sorted(times, key=lambda logs: (times[logs], logs[0].name))
         free = free_bytes(self._folder)
         wanted = 0.0 if offload.keep_free_GB is None else offload.keep_free_GB * _GB
         if free is not None and free + self._removal.in_trash() < wanted:
-            return logs
+            return found
         if offload.keep_days is None or not self._removal.clock_is_right():
             return []
         oldest = time.time() - offload.keep_days * _DAY_S
-        return [log for log in logs if times[log] < oldest]
+        return [logs for logs in found if times[logs] < oldest]
 
-    def _is_safe(self, log: Path, copy: Path) -> bool:
+    def _is_safe(self, log: Path, offload: OffloadSettings) -> bool:
+        if not self._notes.is_copied(log):
+            return False
+        if offload.to is None:
+            return True  # the store is asked when log and copy are read once more
+        copy = offload.to / log.name
         try:
             here, there = log.stat(), copy.stat()
             # a disk that is not mounted leaves an empty folder on the first one
             other_disk = there.st_dev != here.st_dev
-            same = there.st_size == here.st_size and sum_of(copy).exists()
+            return other_disk and there.st_size == here.st_size and sum_of(copy).exists()
         except OSError:
             return False
-        return other_disk and same and self._notes.is_copied(log)
 
     def _kept(self, log: Path, why: Phrase) -> None:
         """Say why a recording stays, and let it be copied again."""

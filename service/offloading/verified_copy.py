@@ -10,7 +10,8 @@ from rig.errors import StorageError
 from rig.host.files import open_to_read
 
 _PIECE: Final = 1 << 22
-_SUM: Final = ".sha256"
+#: Ending of the file with the checksum of a copied log, beside it.
+SUM: Final = ".sha256"
 #: Bytes that wait in memory for the other disk: few, so that memory and disks stay free for a recording.
 _SYNC: Final = 1 << 26
 
@@ -61,7 +62,19 @@ def copy_file(source: Path, part: Path, told: Callable[[int], None]) -> str:
 
 def sum_of(copy: Path) -> Path:
     """The file with the checksum of a copied log, beside it."""
-    return copy.with_name(copy.name + _SUM)
+    return copy.with_name(copy.name + SUM)
+
+
+def sum_line(digest: str, name: str) -> bytes:
+    """Its content, as `sha256sum --check` reads it."""
+    return f"{digest}  {name}\n".encode()
+
+
+def files_of(source: Path) -> list[Path]:
+    """A file, or the files in a folder and below."""
+    if not source.is_dir():
+        return [source]
+    return [path for path in sorted(source.rglob("*")) if path.is_file() and not path.is_symlink()]
 
 
 def checksum(path: Path, told: Callable[[int], None]) -> str:

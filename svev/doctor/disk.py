@@ -90,7 +90,7 @@ def look_at_other_disks(rig: RigSettings, directory: Path) -> Iterator[Finding]:
     """Can the folders be written in which a recording goes on, or is copied, and are they on other disks?"""
     if rig.recorder.fallback_directory is not None:
         yield from _look_at_other_disk(rig.recorder.fallback_directory, "recorder.fallback_directory", directory)
-    if rig.offload is not None:
+    if rig.offload is not None and rig.offload.to is not None:
         yield from _look_at_other_disk(rig.offload.to, "offload.to", directory)
 
 

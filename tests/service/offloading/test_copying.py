@@ -15,7 +15,7 @@ from rig.background.messages import End, Failed, Progress
 from rig.errors import StorageError
 from rig.transport.process_table import Child, ProcessSpec
 from service.offloading import verified_copy
-from service.offloading.copying import Copy
+from service.offloading.orders import Copy
 from service.offloading.verified_copy import copy_file
 from tests.support.waiting import wait_until
 

@@ -13,10 +13,12 @@ from recorder.catalogue.folder import Catalogue
 from rig.background.messages import End
 from rig.events import Event
 from rig.settings.model import OffloadSettings
-from service.offloading.copying import Copy, _copy
+from service.offloading.copying import _copy
 from service.offloading.notes import CopyNotes, mark_of
+from service.offloading.orders import Copy
 from service.offloading.releasing import Releasing, Removal
-from tests.recorder.logs import write_log
+from tests.recorder.logs import ALL_OK, write_log
+from tests.recorder.split import split_log
 from tests.support.other_disk import other_disk
 from tests.support.rigs import SIM
 
@@ -37,11 +39,15 @@ class Bench:
         for name, days in (("old", 40), ("new", 20)):
             log = self.log(name)
             write_log(log)
-            then = time.time() - days * DAY_S
-            os.utime(log, (then, then))
-            mark = mark_of(log)
-            assert _copy(Copy(paths=(log,), to=self.to), lambda *_, **__: None) == End()  # type: ignore[arg-type]
-            self.notes.note(log, mark, None)
+            self.copied(log, days)
+
+    def copied(self, log: Path, days: float) -> None:
+        """Let a log be so many days old, and copied."""
+        then = time.time() - days * DAY_S
+        os.utime(log, (then, then))
+        mark = mark_of(log)
+        assert _copy(Copy(paths=(log,), to=self.to), lambda *_, **__: None) == End()  # type: ignore[arg-type]
+        self.notes.note(log, mark, None)
 
     def log(self, name: str) -> Path:
         return self.folder / f"{name}.mcap"
@@ -92,6 +98,22 @@ def test_room_is_kept_free_by_releasing_the_oldest(bench: Bench, monkeypatch: py
     assert bench.release(keep_free_GB=1.0) == ["new", "old"]
     assert bench.release(keep_free_GB=1.0 + size / 2e9) == ["new"]  # what lies in the trash counts as free
     assert bench.release(keep_free_GB=100.0) == []
+
+
+def test_a_split_recording_is_released_whole(bench: Bench, tmp_path: Path) -> None:
+    write_log(tmp_path / "whole.mcap", (ALL_OK,) * 9)
+    parts = split_log(tmp_path / "whole.mcap", bench.log("long"), (4, 3))
+    for part, days in zip(parts, (40, 35, 20), strict=True):
+        bench.copied(part, days)
+    assert bench.release(keep_days=30) == ["long", "long-part2", "long-part3", "new"], "its end is not old enough"
+    bench.copied(parts[2], 31)
+    bench.notes.note(parts[1], "another", None)
+    assert bench.release(keep_days=30) == ["long", "long-part2", "long-part3", "new"], "its middle is not safe"
+    bench.copied(parts[1], 35)
+    assert bench.release(keep_days=30) == ["new"]
+    assert bench.said[-1].startswith("long is released")
+    (entry,) = [entry for entry in bench.catalogue.entries(deleted=True) if entry.id == "long"]
+    assert entry.parts == ("long", "long-part2", "long-part3")
 
 
 def _another_copy(bench: Bench) -> None:

@@ -1,0 +1,194 @@
+"""Off-loading is cut off at random, again and again: nothing is lost, and nothing is copied twice."""
+
+import errno
+import hashlib
+import os
+import random
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+
+from tests.capture.rigs import write_rig
+from tests.recorder.logs import ALL_OK, write_log
+from tests.recorder.split import split_log
+from tests.service.serving import Serving, serving
+from tests.support.faulty_disk import FaultyDisk
+from tests.support.loopback import Loopback
+from tests.support.object_store import KEYS, object_store, put, take
+from tests.support.other_disk import other_disk
+from tests.support.waiting import wait_until
+
+pytestmark = [pytest.mark.long, pytest.mark.alone, pytest.mark.timeout(1500)]
+
+_CUTS: Final = 50
+_PATIENCE_S: Final = 400.0
+#: A cut comes at any moment within so long after the first copy is at work.
+_WITHIN_S: Final = 0.6
+_LARGE: Final = 6
+
+
+def _recordings(folder: Path) -> dict[str, bytes]:
+    """Logs of a day: one that is split, small ones, and some that take a while to copy; all by name."""
+    folder.mkdir()
+    write_log(folder / "first.mcap", (ALL_OK,) * 9)
+    split_log(folder / "first.mcap", folder / "long.mcap", (4, 3))
+    for number in range(4):
+        write_log(folder / f"small-{number}.mcap", (ALL_OK,) * (2 + number))
+        (folder / f"small-{number}.measured").mkdir()
+        (folder / f"small-{number}.measured" / "report.html").write_text(f"report {number}")
+    head = (folder / "first.mcap").read_bytes()
+    for number in range(_LARGE):  # a log that was never closed, with what no reader understands behind it
+        (folder / f"large-{number}.mcap").write_bytes(head + np.random.default_rng(number).bytes(24_000_000))
+    return {path.name: path.read_bytes() for path in folder.glob("*.mcap")}
+
+
+def _uploader(service: Serving) -> int | None:
+    """The program that copies, if it runs."""
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError, ValueError):
+            if b"service.offloading.copying" in (entry / "cmdline").read_bytes():
+                ancestor = int(entry.name)
+                while ancestor > 1:
+                    ancestor = int((Path("/proc") / str(ancestor) / "stat").read_text().rpartition(")")[2].split()[1])
+                    if ancestor == service.pid:
+                        return int(entry.name)
+    return None
+
+
+def _kill_uploader(service: Serving) -> None:
+    if (pid := _uploader(service)) is not None:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+
+@contextmanager
+def _cut_service(folder: Path, rig: Path, loopback: Loopback, environment: dict[str, str]) -> Iterator[Serving]:
+    """A service that ends by SIGKILL."""
+    with serving(folder, rig, loopback, environment=environment, ends_with=-signal.SIGKILL) as service:
+        yield service
+        service.signal(signal.SIGKILL)
+
+
+def _rig(folder: Path, loopback: Loopback, offload: str) -> Path:
+    rig = write_rig(folder, "sim", loopback)
+    rig.write_text(f"{rig.read_text()}\n[offload]\n{offload}\n")
+    return rig
+
+
+def _whole(folder: Path, logs: dict[str, bytes]) -> None:
+    """Each log is once in the folder or in its trash, as it was."""
+    found = [path for place in (folder, folder / ".trash") for path in place.glob("*.mcap")]
+    assert sorted(path.name for path in found) == sorted(logs)
+    assert [path.name for path in found if path.read_bytes() != logs[path.name]] == []
+
+
+def _await_release(service: Serving, logs: dict[str, bytes]) -> None:
+    trash = service.data / ".trash"
+    wait_until(
+        lambda: {path.name for path in trash.glob("*.mcap")} == {*logs},
+        f"all are released: {service.log.read_text()}",
+        _PATIENCE_S,
+    )
+
+
+def _confirmed(there: Path) -> dict[str, tuple[int, int]]:
+    """The copies that count, and what tells when they were written."""
+    stats = {path.stem: (there / path.stem).stat() for path in there.glob("*.mcap.sha256")}
+    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in stats.items()}
+
+
+def _check_copies(there: Path, logs: dict[str, bytes]) -> None:
+    """The copies are all logs, each once and as it was, with its checksum; nothing half made is beside them."""
+    results = {f"small-{number}.measured" for number in range(4)}
+    assert {path.name for path in there.iterdir()} == {*logs, *(f"{name}.sha256" for name in logs), *results}
+    for name, content in logs.items():
+        assert (there / name).read_bytes() == content
+        assert (there / f"{name}.sha256").read_text() == f"{hashlib.sha256(content).hexdigest()}  {name}\n"
+    checked = ["/usr/bin/sha256sum", "--check", "--quiet", *(f"{name}.sha256" for name in logs)]
+    subprocess.run(checked, cwd=there, check=True)
+    assert {(there / name / "report.html").read_text() for name in results} == {f"report {n}" for n in range(4)}
+
+
+def test_fifty_cuts_lose_nothing_and_copy_nothing_twice(tmp_path: Path, loopback: Loopback, disk: FaultyDisk) -> None:
+    """The service or its copying program is killed, the other disk is gone or full, while recordings are released."""
+    logs, draw = _recordings(tmp_path / "data"), random.Random(50)
+    with other_disk() as other:
+        there, away = other / "jumps", other / "away"
+        there.mkdir()
+        rig = _rig(tmp_path, loopback, f'to = "{there}"\nkeep_free_GB = 1e6')
+        begun, known = 0, dict[str, tuple[int, int]]()
+
+        def gone(_: Serving) -> None:
+            there.rename(away)
+
+        def full(_: Serving) -> None:
+            disk.fail(errno.ENOSPC, only=there)
+
+        cuts: tuple[Callable[[Serving], None], ...] = (lambda _: None, _kill_uploader, gone, full)
+        for cut in range(_CUTS):
+            if len(known) == len(logs):  # all are copied: once more from the beginning, with other files
+                _whole(tmp_path / "data", logs)
+                _check_copies(there, logs)
+                for path in there.glob("large-*"):
+                    path.unlink()
+                    known.pop(path.name, None)
+                for path in (tmp_path / "data" / ".trash").glob("*"):
+                    path.rename(tmp_path / "data" / path.name)
+                (tmp_path / "data" / ".svev-offload.json").unlink()
+            with _cut_service(tmp_path, rig, loopback, dict(disk.environment)) as service:
+                with suppress(AssertionError):  # there may be nothing left to do
+                    wait_until(lambda: _uploader(service) is not None, "it copies", 5)
+                    begun += 1
+                time.sleep(draw.uniform(0, _WITHIN_S))
+                cuts[cut % len(cuts)](service)
+                if cut % len(cuts):
+                    time.sleep(draw.uniform(0, _WITHIN_S))
+            disk.heal()
+            if away.exists():
+                away.rename(there)
+            _whole(tmp_path / "data", logs)
+            now = _confirmed(there)
+            assert {name: now.get(name) for name in known} == known, "what is copied is not copied again"
+            known = now
+        assert begun > _CUTS // 2, "most cuts hit a copy"
+        with serving(tmp_path, rig, loopback) as service:
+            wait_until(
+                lambda: len([*(service.data / ".trash").glob("*.mcap")]) == len(logs), "all released", _PATIENCE_S
+            )
+        _whole(tmp_path / "data", logs)
+        _check_copies(there, logs)
+        assert {name: _confirmed(there)[name] for name in known} == known
+
+
+def test_an_object_store_is_copied_into_across_cuts(tmp_path: Path, loopback: Loopback) -> None:
+    """A real S3 server; what is there in the end is taken out by another program."""
+    logs, draw = _recordings(tmp_path / "data"), random.Random(51)
+    with object_store(loopback) as address:
+        put(address, "hill")
+        offload = f'store = "s3://hill/jumps"\nstore_options = {{ endpoint_url = "{address}" }}\nkeep_free_GB = 1e6'
+        rig = _rig(tmp_path, loopback, offload)
+        begun = 0
+        for cut in range(_CUTS // 5):
+            with _cut_service(tmp_path, rig, loopback, KEYS) as service:
+                with suppress(AssertionError):
+                    wait_until(lambda: _uploader(service) is not None, "it copies", 5)
+                    begun += 1
+                time.sleep(draw.uniform(0, 3 * _WITHIN_S))
+                if cut % 2:
+                    _kill_uploader(service)
+            _whole(tmp_path / "data", logs)
+        assert begun > 2
+        with serving(tmp_path, rig, loopback, environment=KEYS) as service:
+            wait_until(
+                lambda: len([*(service.data / ".trash").glob("*.mcap")]) == len(logs), "all released", _PATIENCE_S
+            )
+        _whole(tmp_path / "data", logs)
+        take(address, "hill/jumps", str(tmp_path / "taken"))
+    _check_copies(tmp_path / "taken", logs)

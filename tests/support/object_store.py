@@ -1,0 +1,55 @@
+"""An object store on loopback: a real S3 server (moto), reached through fsspec by programs of their own."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from tests.support.loopback import Loopback
+
+#: In a process of its own, as a workplace would use it: the libraries keep threads and connections.
+_PROGRAM: Final = """
+import sys, fsspec
+address, what, bucket, *more = sys.argv[1:]
+store = fsspec.filesystem("s3", endpoint_url=address)
+if what == "put":
+    if bucket.partition("/")[0] not in [name.rstrip("/") for name in store.ls("")]:
+        store.mkdir(bucket.partition("/")[0])
+    for path in more:
+        store.put_file(path, bucket + "/" + path.rsplit("/", 1)[1])
+else:
+    store.get(bucket + "/", more[0], recursive=True)
+"""
+#: No secrets.
+KEYS: Final = {"AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test", "AWS_DEFAULT_REGION": "us-east-1"}
+
+
+@contextmanager
+def object_store(loopback: Loopback) -> Iterator[str]:
+    """An S3 server; gives its address."""
+    port = loopback.free_port()
+    command = [sys.executable, "-m", "moto.server", "-H", loopback.host, "-p", str(port)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr is not None
+            next(line for line in process.stderr if "Running on" in line)
+            yield f"http://{loopback.host}:{port}"
+        finally:
+            process.kill()
+
+
+def put(address: str, place: str, *paths: str) -> None:
+    """Put files into a bucket, which is made if there is none; `place`: bucket, or bucket/folder."""
+    _run(address, "put", place, *paths)
+
+
+def take(address: str, place: str, folder: str) -> None:
+    """Take everything out of a bucket, or a folder in it."""
+    _run(address, "take", place, folder)
+
+
+def _run(address: str, *arguments: str) -> None:
+    command = [sys.executable, "-c", _PROGRAM, address, *arguments]
+    subprocess.run(command, env=os.environ | KEYS, timeout=60, check=True)

@@ -42,8 +42,9 @@ _COLUMNS: Final = {
     "logs": ("path", "deleted", "growing", "keys", "plain", "entry"),
     "recordings": (
         "path", "id", "deleted", "time_ns", "duration_s", "level", "athlete", "bib", "bib_number", "favourite", "tags",
-        "continues", "part", "hill", "text", "session", "said", "entry",
+        "continues", "part", "hill", "text", "session", "said",
     ),
+    "joined": ("path", "entry"),
     "jumps": ("path", "jump", "time_ns", "live", "ok", *FIGURES, "content"),
 }  # fmt: skip
 _SCHEMA: Final = f"""
@@ -54,10 +55,11 @@ CREATE INDEX logs_growing ON logs (deleted) WHERE growing;
 CREATE TABLE recordings (
   path TEXT PRIMARY KEY, id TEXT, deleted INTEGER, time_ns INTEGER, duration_s REAL, level TEXT, athlete TEXT, bib TEXT,
   bib_number INTEGER, favourite INTEGER, tags TEXT, continues TEXT, part INTEGER, hill TEXT, text TEXT, session TEXT,
-  said TEXT, entry BLOB, checksum INTEGER);
+  said TEXT, checksum INTEGER);
 CREATE INDEX recordings_time ON recordings (deleted, time_ns, id);
 CREATE INDEX recordings_athlete ON recordings (athlete);
 CREATE INDEX recordings_continues ON recordings (continues) WHERE continues != '';
+CREATE TABLE joined (path TEXT PRIMARY KEY, entry BLOB, checksum INTEGER) WITHOUT ROWID;
 CREATE TABLE jumps (
   path TEXT, jump INTEGER, time_ns INTEGER, live INTEGER, ok INTEGER, {", ".join(f"{name} REAL" for name in FIGURES)},
   content BLOB, checksum INTEGER, PRIMARY KEY (path, jump)) WITHOUT ROWID;

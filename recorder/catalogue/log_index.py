@@ -18,7 +18,7 @@ from recorder.catalogue.entry import SUFFIX, Entry, LogState, joined, read_entry
 from recorder.catalogue.file_key import FileKey, file_key, key_of
 from recorder.catalogue.folder_watch import FolderWatch
 from recorder.catalogue.trash import trash_of
-from recorder.catalogue.whole_recordings import int64, parts_with, put_recording
+from recorder.catalogue.whole_recordings import entries_of, int64, parts_with, put_recording
 from recorder.log.jumper_path import jumper_path
 from recorder.log.measured_path import measured_path
 from recorder.log.session_changes import session_path
@@ -129,8 +129,8 @@ class LogIndex:
 
         def answer(connection: sqlite3.Connection) -> tuple[int, list[Entry]]:
             self._look_around(connection, deleted=query.deleted)
-            total, entries = search.found_recordings(connection, query)
-            return total, [_ENTRIES.decode(entry) for entry in entries]
+            total, paths = search.found_paths(connection, query)
+            return total, entries_of(connection, paths)
 
         return self._answer(answer)
 
@@ -158,7 +158,8 @@ class LogIndex:
         def answer(connection: sqlite3.Connection) -> Mapping[str, str]:
             self._look_around(connection, deleted=deleted)
             wanted = "continues IN (SELECT value FROM json_each(?)) AND continues != '' AND deleted = ? AND part = 1"
-            asked = f"SELECT continues, id FROM recordings WHERE {wanted}"  # noqa: S608
+            table = "recordings INDEXED BY recordings_continues"  # a few, among which SQLite would not look first
+            asked = f"SELECT continues, id FROM {table} WHERE {wanted}"  # noqa: S608
             return dict(connection.execute(asked, (wire.encode(ids).decode(), int(deleted))).fetchall())
 
         return self._answer(answer)
@@ -222,7 +223,8 @@ class LogIndex:
             watch.forget()
             for table in ("recordings", "logs"):
                 connection.execute(f"DELETE FROM {table} WHERE deleted = ?", (int(deleted),))  # noqa: S608
-            connection.execute("DELETE FROM jumps WHERE path NOT IN (SELECT path FROM logs)")
+            for table in ("joined", "jumps"):
+                connection.execute(f"DELETE FROM {table} WHERE path NOT IN (SELECT path FROM logs)")  # noqa: S608
             raise
         except BaseException:
             watch.forget()  # what was told is not yet known

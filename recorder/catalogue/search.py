@@ -40,8 +40,8 @@ class Conditions:
         return " AND ".join(self.texts) or "TRUE"
 
 
-def found_recordings(connection: sqlite3.Connection, query: RecordingQuery) -> tuple[int, list[bytes]]:
-    """How many recordings fit a query, and the entries of those on the page that it asks for, in its order.
+def found_paths(connection: sqlite3.Connection, query: RecordingQuery) -> tuple[int, list[str]]:
+    """How many recordings fit a query, and the paths of those on the page that it asks for, in its order.
 
     Raises:
         BadInputError: its text cannot be understood.
@@ -49,12 +49,12 @@ def found_recordings(connection: sqlite3.Connection, query: RecordingQuery) -> t
     conditions = _of_recordings(query)
     where, values = conditions.where, conditions.values
     limit = -1 if query.limit is None else query.limit
-    listed = f"SELECT entry FROM recordings r WHERE {where} ORDER BY {_ORDERS[query.sort]} LIMIT ? OFFSET ?"  # noqa: S608
-    entries = [row[0] for row in connection.execute(listed, (*values, limit, query.offset))]
-    if not query.offset and (query.limit is None or len(entries) < query.limit):
-        return len(entries), entries
+    listed = f"SELECT path FROM recordings r WHERE {where} ORDER BY {_ORDERS[query.sort]} LIMIT ? OFFSET ?"  # noqa: S608
+    paths = [row[0] for row in connection.execute(listed, (*values, limit, query.offset))]
+    if not query.offset and (query.limit is None or len(paths) < query.limit):
+        return len(paths), paths
     (total,) = connection.execute(f"SELECT count(*) FROM recordings r WHERE {where}", values).fetchone()  # noqa: S608
-    return total, entries
+    return total, paths
 
 
 def found_jumps(connection: sqlite3.Connection, query: JumpQuery, columns: str) -> Sequence[tuple[Any, ...]]:

@@ -1,7 +1,7 @@
 """The rows of recordings in the catalogue's file, each made of the rows of all logs into which a recording is split."""
 
 import sqlite3
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -42,6 +42,16 @@ def parts_with(connection: sqlite3.Connection, path: str) -> tuple[str, ...]:
     return tuple(map(str, whole))
 
 
+def entries_of(connection: sqlite3.Connection, paths: Sequence[str]) -> list[Entry]:
+    """The entries of recordings, by the paths of their first logs, in the order of these; one query for all."""
+    asked = (
+        "SELECT l.path, coalesce(j.entry, l.entry) FROM logs l LEFT JOIN joined j ON j.path = l.path "
+        "WHERE l.path IN (SELECT value FROM json_each(?))"
+    )
+    found = dict(connection.execute(asked, (wire.encode(paths).decode(),)).fetchall())
+    return [_ENTRIES.decode(found[path]) for path in paths]
+
+
 def put_recording(connection: sqlite3.Connection, path: str, level: Callable[[Entry], str]) -> None:
     """Write the row of the recording to which a log belongs, and none for its later parts.
 
@@ -55,6 +65,10 @@ def put_recording(connection: sqlite3.Connection, path: str, level: Callable[[En
     entry = joined([_ENTRIES.decode(connection.execute(asked, (part,)).fetchone()[0]) for part in parts])
     for part in parts[1:]:
         connection.execute("DELETE FROM recordings WHERE path = ?", (part,))
+    for part in parts:
+        connection.execute("DELETE FROM joined WHERE path = ?", (part,))
+    if len(parts) > 1:
+        database.put(connection, "joined", (parts[0], wire.encode(entry)))
     session = {field: escaped(text) for field, text in entry.session.items()}
     said = "\n".join((entry.id, *(text for field, text in session.items() if field not in _UNSEARCHED)))
     bib = folded(session.get("bib", ""))
@@ -68,7 +82,7 @@ def put_recording(connection: sqlite3.Connection, path: str, level: Callable[[En
             part_number(session), folded(session.get("hill", "") or escaped(entry.rig)),
             folded(said[:_LONGEST_SEARCHED]),
             wire.encode({folded(field): folded(text) for field, text in session.items()}).decode(),
-            wire.encode({field: session.get(field, "") for field in _SHOWN}).decode(), wire.encode(entry),
+            wire.encode({field: session.get(field, "") for field in _SHOWN}).decode(),
         ),
     )  # fmt: skip
 

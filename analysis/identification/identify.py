@@ -18,7 +18,7 @@ from analysis.identification.markers.synchrony import lateness
 from analysis.identification.over_time.flights import Flight, find_flights, find_tracks
 from analysis.identification.over_time.window import Window
 from analysis.identification.ski_bars import MeasuredSkis, measure_skis
-from analysis.identification.space.body import BINDINGS
+from analysis.identification.space.body import BINDINGS, HIP
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
 from analysis.identification.unmarked_skis import beside_skis, off_skis, shown_by_two
@@ -167,10 +167,10 @@ class Sighting:
             numbers, named = np.array([c.pulse for c in window.candidates]), self.pulses()
             steps = (numbers >= named[0]) & (numbers <= named[-1])
             steps &= window.time_s > window.time_s[steps][-1] - _SKIS_S
-        places = markers.places(BINDINGS)
+        places, hips = markers.places(BINDINGS), markers.places(HIP)
         skis: Sequence[MeasuredSkis] = [{}] * len(window)
         if look is not None:
-            skis = measure_skis(views, window, flight, places, look, steps)
+            skis = measure_skis(views, window, flight, places, hips, look, steps)
             seen = np.any(markers.assigned.rays >= 0, axis=(1, 2))
             if not briefly and shown_by_two(skis) < np.count_nonzero(seen):  # half of two skis each
                 markers, skis = self._by_skis(markers, skis, look, steps)
@@ -186,7 +186,7 @@ class Sighting:
         beside = beside_skis(views, window, flight, markers, look)
         if beside is None:
             return markers, skis
-        others = measure_skis(views, window, flight, beside.places(BINDINGS), look, steps)
+        others = measure_skis(views, window, flight, beside.places(BINDINGS), beside.places(HIP), look, steps)
         if shown_by_two(others) <= shown_by_two(skis):
             return markers, skis
         markers = follow_further(views, window, flight, settled_again(views, window, flight, beside), look)

@@ -22,7 +22,7 @@ from analysis.measurements.model import SIDES, SkiMeasurement
 from analysis.ski_bars.bars import OF_POSE, SKIS, USUAL_SHAPE, USUAL_SHAPE_SIGMA, ExpectedBars, Poses
 from analysis.ski_bars.directions import OPENING, SHARP_M, is_sharp, seek_directions
 from analysis.ski_bars.fitting import FittedBars, fit_bars
-from analysis.ski_bars.pixels import SkiView
+from analysis.ski_bars.pixels import Legs, SkiView
 from photogrammetry.jumper.stick_model import by_slope_and_heading, slope_and_heading
 from rig.arrays import Flags, Floats
 
@@ -31,7 +31,7 @@ MeasuredSkis = Mapping[str, Mapping[str, SkiMeasurement]]
 
 _VAGUE_M: Final = 0.2  #: standard deviation of the place of a binding from which its ski is sought through all pulses
 _FEWEST: Final = 2  #: images that show a binding
-SOUGHT_RAD: Final = np.radians(2.0)  #: standard deviation of a direction that was sought
+SOUGHT_RAD: Final = np.radians((6.0, 2.0))  #: standard deviations of a direction that was sought: to the side, up
 _BINDING_M: Final = 0.06  #: of a binding's marker from the axis of its ski, in any direction
 _STEADY_M: Final = 0.015  #: of that distance from pulse to pulse
 _TELLING: Final = 12  #: pulses that tell how long the skis are
@@ -80,7 +80,7 @@ class Bindings:
 
 
 def measure_skis(
-    views: Views, window: Window, flight: Flight, bindings: Bindings, look: SecondLook, steps: Flags
+    views: Views, window: Window, flight: Flight, bindings: Bindings, hips: Bindings, look: SecondLook, steps: Flags
 ) -> list[MeasuredSkis]:
     """Measure both skis in the images of a window.
 
@@ -89,14 +89,18 @@ def measure_skis(
         window: t pulses.
         flight: of the jumper.
         bindings: their places.
+        hips: places of the hip (t, 1).
         look: at the images.
         steps: (t,) the pulses in which they are wanted.
 
     Returns:
         Of each pulse.
     """
-    pulses = [ski_views(views, window, flight, t, look) if steps[t] else [] for t in range(len(window))]
     bindings = bindings.side_by_side(flight.axes)
+    pulses = [
+        ski_views(views, window, flight, t, look, legs(bindings.at(t), hips.at(t))) if steps[t] else []
+        for t in range(len(window))
+    ]
     known = np.array([sought_from(of, bindings.at(t), _VAGUE_M) for t, of in enumerate(pulses)])
     # What is seen from a vague place alone may be the other ski.
     known &= (known & is_sharp(bindings.covariance)).any(axis=1, keepdims=True)
@@ -104,7 +108,7 @@ def measure_skis(
         return [{} for _ in pulses]
     sought = seek_directions(pulses, bindings.xyz, bindings.covariance, known, window.time_s, flight.axes)
     pair = SkiPair()
-    turning = np.tile(SOUGHT_RAD**2 * np.eye(2), (SKIS, 1, 1))
+    turning = np.tile(np.diag(SOUGHT_RAD**2), (SKIS, 1, 1))
 
     def fitted(t: int) -> FittedBars:
         return pair.fitted(pulses[t], bindings.at(t), sought.direction[t], turning, known[t])
@@ -118,11 +122,21 @@ def measure_skis(
     return [{} if fit is None else measured(fit, own) for fit, own in zip(found, seen, strict=True)]
 
 
-def ski_views(views: Views, window: Window, flight: Flight, t: int, look: SecondLook) -> list[SkiView]:
-    """The images of a pulse of a window."""
+def legs(bindings: Bindings, hips: Bindings) -> Legs:
+    """The legs of a pulse, as far as feet and hip are known, perhaps vaguely."""
+    sigma = [np.sqrt(np.linalg.eigvalsh(of.covariance)[:, -1]) for of in (bindings, hips)]
+    known = (sigma[0] < _VAGUE_M) & (sigma[1] < _VAGUE_M)
+    ends = np.stack((bindings.xyz, np.tile(hips.xyz, (SKIS, 1))), axis=1)
+    return Legs(ends[known], np.column_stack(np.broadcast_arrays(*sigma))[known])
+
+
+def ski_views(
+    views: Views, window: Window, flight: Flight, t: int, look: SecondLook, legs: Legs | None = None
+) -> list[SkiView]:
+    """The images of a pulse of a window, in which legs may lie before skis."""
     pulse, velocity = window.candidates[t].pulse, flight.velocity(window.time_s[t : t + 1])[0]
     return [
-        SkiView(placed, partial(look.part, pulse, name), velocity * window.late_s[k])
+        SkiView(placed, partial(look.part, pulse, name), velocity * window.late_s[k], legs or Legs())
         for k, (name, placed) in enumerate(zip(views.names, views.placed, strict=True))
         if window.delivered[t, k]
     ]

@@ -34,6 +34,8 @@ _ALONG_M, _ACROSS_M = 0.1, 0.02  #: of a binding from where the middle of a fitt
 _GAIN: Final = 5.0
 _MARKER_M, _SIGMAS = 0.06, 3.0  #: of a binding's marker from the axis of its ski; so many are too many
 _FEWEST: Final = 3  #: pulses that show both skis
+#: Share of the pairs that lines lead to which fits must confirm: where they refuse most of them, the rest is chance.
+_CONFIRMED: Final = 0.5
 _IMAGES: Final = 2
 
 
@@ -67,7 +69,8 @@ def beside_skis(views: Views, window: Window, flight: Flight, markers: Markers, 
             spread[i, k] = (
                 fit.covariance[place, place] + _ALONG_M**2 * np.outer(along, along) + _ACROSS_M**2 * np.eye(3)
             )
-    if np.isfinite(xyz).all(axis=(1, 2)).sum() < _FEWEST:
+    both = np.count_nonzero(np.isfinite(xyz).all(axis=(1, 2)))
+    if both < max(_FEWEST, _CONFIRMED * len(sure)):
         return None
     return with_bindings(window, flight, markers, steps[sure], xyz, spread)
 

@@ -25,11 +25,12 @@ from analysis.ski_bars.model import BOOT_M, SHOVEL_M
 from analysis.ski_bars.pixels import SkiView, to_piece
 from rig.arrays import Flags, Floats, Integers
 
-#: Slope and heading of a ski against the flight, rad, standard deviations, and how far from it they are sought.
+#: Slope and heading of a ski against the flight, rad, standard deviations, and how far from it they are sought: no ski
+#: is steeper before the landing.
 SLOPE_SIGMA, HEADING_SIGMA = np.radians(25.0), np.radians(15.0)
+FARTHEST_RAD: Final = (np.radians(45.0), np.radians(36.0))
 #: The left ski against the right one, rad: standard deviation of the slope, mean and standard deviation of the heading.
 SLOPES_APART, OPENING, OPENING_SIGMA = np.radians(8.0), np.radians(15.0), np.radians(15.0)
-_SOUGHT_SIGMAS: Final = 2.4
 _COARSE, _FINE = np.radians(4.0), np.radians(1.0)
 _AROUND: Final = 5  # fine steps to each side of the coarse direction
 _TURNS: Final = 0.6  # of the steps of the directions: those of the lines in an image
@@ -40,6 +41,7 @@ _ASIDE_SIGMAS, _STEP_M, _BESIDE_M = 1.8, 0.03, 0.09
 _ASIDE_SIGMA_M: Final = 0.05  # of the axis from a binding's marker, across it
 SHARP_M: Final = 0.1  #: standard deviation of a binding from which on it is known vaguely alone
 _TAKEN_M, _TAKEN_PX = 0.05, 2.0  # half the width of what another ski explains: itself, and the blur
+_BESIDE_LEG_M: Final = 0.06  # a marker lies so far from the axis of a leg, and a knee from the line to the hip
 _REACH_M: Final = (-1.28, 1.52)
 _ALONG_M: Final = 0.08
 _ALIKE_PX: Final = 8.0  # along a ski, over which errors of the model are alike
@@ -82,10 +84,7 @@ def seek_directions(
         axes: (3, 3) forward, left and up as rows.
     """
     sharp = known & is_sharp(covariance)
-    slope, heading = (
-        np.arange(-round(_SOUGHT_SIGMAS * sigma / _COARSE), round(_SOUGHT_SIGMAS * sigma / _COARSE) + 1) * _COARSE
-        for sigma in (SLOPE_SIGMA, HEADING_SIGMA)
-    )
+    slope, heading = (np.arange(-round(most / _COARSE), round(most / _COARSE) + 1) * _COARSE for most in FARTHEST_RAD)
     prior = -0.5 * ((slope[:, None] / SLOPE_SIGMA) ** 2 + (heading / HEADING_SIGMA) ** 2)
     around = np.arange(-_AROUND, _AROUND + 1) * _FINE
     beside = -0.5 * (np.hypot(around[:, None], around) / _COARSE) ** 2
@@ -329,6 +328,9 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
     )
     inside = (x >= 0) & (x <= region.grey.shape[1] - 1) & (y >= 0) & (y <= region.grey.shape[0] - 1)
     inside = inside.reshape(shape)
+    if len(view.legs.ends):
+        places = np.stack((x + region.x, y + region.y), axis=-1).astype(float)
+        inside &= ~view.on_legs(places, _BESIDE_LEG_M).reshape(shape)
     if taken is not None:
         ends = taken[0] + np.array(USUAL_SHAPE[1:])[:, None] * taken[1] + view.shift
         places = np.stack((x + region.x, y + region.y), axis=-1).reshape(-1, 2)

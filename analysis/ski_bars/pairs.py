@@ -15,6 +15,7 @@ import numpy as np
 
 from analysis.ski_bars.bars import SKIS, USUAL_SHAPE
 from analysis.ski_bars.directions import (
+    FARTHEST_RAD,
     HEADING_RAD_S,
     HEADING_SIGMA,
     OPENING,
@@ -100,10 +101,7 @@ def seek_pairs(pulses: Sequence[Sequence[SkiView]], feet: Feet, time_s: Floats, 
         time_s: (t,) of the pulses.
         axes: (3, 3) forward, left and up as rows.
     """
-    slope, heading = (
-        np.arange(-round(_SIGMAS * s / _TURN), round(_SIGMAS * s / _TURN) + 1) * _TURN
-        for s in (SLOPE_SIGMA, HEADING_SIGMA)
-    )
+    slope, heading = (np.arange(-round(most / _TURN), round(most / _TURN) + 1) * _TURN for most in FARTHEST_RAD)
     density = -0.5 * ((slope[:, None] / SLOPE_SIGMA) ** 2 + (heading / HEADING_SIGMA) ** 2)
     direction = directions(slope, heading, axes).reshape(-1, 3)
     angles = np.array([slope_and_heading(of) for of in direction @ axes.T])

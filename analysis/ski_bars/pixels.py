@@ -1,7 +1,7 @@
 """The pixels of all cameras that say something about a pair of skis."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final
 
@@ -11,12 +11,13 @@ import numpy as np
 from analysis.candidates.foreground.background import Region
 from analysis.scene.camera_system import PlacedCamera
 from analysis.ski_bars.bars import SKIS, Poses
-from rig.arrays import Floats, Integers
+from rig.arrays import Flags, Floats, Integers
 
 #: Px beside and beyond a ski that are looked at.
 REACH_PX: Final = 4.0
 #: Px along a ski that are taken together: the errors of the model are alike over more.
 CELL_PX: Final = 2
+_LEG_M: Final = (0.05, 0.09)  # half the width of a leg at foot and hip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +45,19 @@ class Pixels:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Legs:
+    """n legs, each about straight. In one image a leg looks like a ski.
+
+    Attributes:
+        ends: (n, 2, 3) foot and hip, m.
+        sigma: (n, 2) standard deviations of these, m.
+    """
+
+    ends: Floats = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    sigma: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class SkiView:
     """A camera and what it shows of a pulse.
 
@@ -52,11 +66,24 @@ class SkiView:
         part: of the image, before the static scene, from its first column and row to behind its last ones; None where
             the image does not reach.
         shift: (3,) how much farther the skis were when it saw them than at the instant of the result, m.
+        legs: as far as feet and hip are known.
     """
 
     camera: PlacedCamera
     part: Callable[[Integers, Integers], Region | None]
     shift: Floats
+    legs: Legs = field(default_factory=Legs)
+
+    def on_legs(self, xy: Floats, beside_m: float = 0.0) -> Flags:
+        """Which places (..., 2) in the image may show a leg, or what is `beside_m` beside it."""
+        there = np.zeros(xy.shape[:-1], bool)
+        for leg, half_m in zip(self.legs.ends + self.shift, np.hypot(_LEG_M, self.legs.sigma) + beside_m, strict=True):
+            px = self.camera.project(leg)
+            if np.isfinite(px).all():
+                scale = self.camera.camera.interior[0] / np.linalg.norm(leg - self.camera.position, axis=1)
+                along, away = _on_piece(xy, px)
+                there |= away < np.interp(along, (0.0, 1.0), half_m * scale)
+        return there
 
 
 def pixels_around(views: Sequence[SkiView], poses: Poses, ends: Floats, reach_m: float) -> Pixels:
@@ -79,14 +106,14 @@ def pixels_around(views: Sequence[SkiView], poses: Poses, ends: Floats, reach_m:
         low = np.floor(px.min(axis=(0, 1)) - reach).astype(int)
         region = view.part(low, np.ceil(px.max(axis=(0, 1)) + reach).astype(int) + 1)
         if region is not None:
-            parts += [cells for k in range(SKIS) if len((cells := _cells(region, px, k, reach, c))[0])]
+            parts += [cells for k in range(SKIS) if len((cells := _cells(view, region, px, k, reach, c))[0])]
     if not parts:
         return Pixels(np.zeros(0, np.intp), np.zeros((0, 2)), *np.zeros((3, 0)))
     camera, xy, grey, behind, noise = (np.concatenate(part) for part in zip(*parts, strict=True))
     return Pixels(camera.astype(np.intp), xy, grey, behind, noise)
 
 
-def _cells(region: Region, px: Floats, k: int, reach: float, camera: int) -> tuple[Floats, ...]:
+def _cells(view: SkiView, region: Region, px: Floats, k: int, reach: float, camera: int) -> tuple[Floats, ...]:
     """Camera, places, grey values, scene and noise of the cells of ski k, whose ends are at px (2, 2, 2)."""
     way = px[k, 1] - px[k, 0]
     length = float(np.hypot(*way))
@@ -97,6 +124,7 @@ def _cells(region: Region, px: Floats, k: int, reach: float, camera: int) -> tup
     last = np.array(region.grey.shape[::-1]) - 1
     within = xy - (region.x, region.y)
     xy = xy[((within >= 1) & (within <= last - 1)).all(axis=1) & (to_piece(xy, px[k]) <= to_piece(xy, px[1 - k]))]
+    xy = xy[~view.on_legs(xy)]
     if not len(xy):
         return np.zeros(0), xy, *np.zeros((3, 0))
     steps = np.arange(CELL_PX) - (CELL_PX - 1) / 2
@@ -111,8 +139,13 @@ def _cells(region: Region, px: Floats, k: int, reach: float, camera: int) -> tup
 
 def to_piece(xy: Floats, ends: Floats) -> Floats:
     """From places (n, 2) to the straight piece between two ends (2, 2), px."""
+    return _on_piece(xy, ends)[1]
+
+
+def _on_piece(xy: Floats, ends: Floats) -> tuple[Floats, Floats]:
+    """How far along a straight piece its nearest point to places (..., 2) is, 0 to 1, and how far that is, px."""
     step = ends[1] - ends[0]
     t = np.clip((xy - ends[0]) @ step / max(float(step @ step), 1e-9), 0, 1)
     # The norm along an axis of two takes several times as long.
-    x, y = (xy[:, i] - ends[0, i] - t * step[i] for i in (0, 1))
-    return np.asarray(np.sqrt(x * x + y * y))
+    x, y = (xy[..., i] - ends[0, i] - t * step[i] for i in (0, 1))
+    return t, np.asarray(np.sqrt(x * x + y * y))

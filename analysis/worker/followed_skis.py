@@ -63,7 +63,7 @@ class FollowedSkis:
             times, pulses, places, there = zip(*self._moments, strict=True)
             xyz, covariance = (np.array(part) for part in zip(*((at.xyz, at.covariance) for at in places), strict=True))
             sought = seek_directions(pulses, xyz, covariance, np.array(there), np.array(times), axes)
-            direction[unsure], turning[unsure] = sought.direction[-1][unsure], SOUGHT_RAD**2 * np.eye(2)
+            direction[unsure], turning[unsure] = sought.direction[-1][unsure], np.diag(SOUGHT_RAD**2)
         fit = self._pair.fitted(views, bindings, direction, turning, known)
         turned = Poses(bindings.xyz, direction).step_to(fit.poses)[:, 3:]
         contradiction = (turned * np.linalg.solve(turning, turned[..., None])[..., 0]).sum(axis=1)

@@ -19,8 +19,8 @@ from analysis.identification.over_time.flights import Flight
 from analysis.identification.over_time.prediction import Prediction
 from analysis.identification.over_time.window import Window
 from analysis.identification.seeking import Seeker
-from analysis.identification.ski_bars import MeasuredSkis, ski_views
-from analysis.identification.space.body import BINDINGS, REACH_M
+from analysis.identification.ski_bars import MeasuredSkis, legs, ski_views
+from analysis.identification.space.body import BINDINGS, HIP, REACH_M
 from analysis.identification.space.space_points import Appearance
 from analysis.identification.space.views import Views
 from analysis.measurements.model import SIDES, JumpMeasurements, MeasuredCamera, PulseMeasurements
@@ -156,10 +156,11 @@ class Follower:
         points = [_known(point) for point in state.points.values()]
         places = Prediction(np.array([[p.xyz for p in points]]), np.array([[p.covariance for p in points]]))
         assigned = assign(views, window, places, flight.axes)
-        bindings = Markers(assigned, places).places(BINDINGS)
+        markers = Markers(assigned, places)
+        bindings, hips = markers.places(BINDINGS), markers.places(HIP)
         skis: MeasuredSkis = {}
         if look is not None:
-            images = ski_views(views, window, flight, 0, look)
+            images = ski_views(views, window, flight, 0, look, legs(bindings.at(0), hips.at(0)))
             time_s = float(window.time_s[0])
             skis = self._skis.measured(time_s, images, bindings.at(0), _angles(state, flight), flight.axes)
         measured = named_pulse(views, window.candidates[0], assigned.rays[0], skis)

@@ -30,6 +30,8 @@ _DISTANCES: Final = {
 }
 #: Indices of P3 and P4 in `POINTS`.
 BINDINGS: Final = [2, 3]
+#: Index of P2 in `POINTS`.
+HIP: Final = [1]
 #: Implausibility that nine in ten pairs of points of bodies stay below: chi-square, 4 degrees of freedom.
 USUAL = 7.8
 #: A jumper with skis is not longer than this, m.

@@ -1,12 +1,18 @@
 """The directions of skis are found from their bindings alone, through the pulses."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 
+from analysis.candidates.foreground.background import Region
 from analysis.identification.markers.markers import ANYWHERE_M
 from analysis.identification.ski_bars import Bindings
 from analysis.ski_bars.directions import Directions, seek_directions
-from rig.arrays import Floats
+from analysis.ski_bars.pixels import Legs, SkiView
+from rig.arrays import Floats, Integers
 from tests.analysis.digitizing.following.tracked_hill import RATE_HZ, TrackedHill, hill
 from tests.analysis.ski_bars.hill_views import views_of
 from tests.support.repeats import repeats
@@ -60,3 +66,42 @@ def test_a_ski_without_a_marker_is_found_beside_the_other_one(of: TrackedHill) -
     off = _off_deg(of, pulses, found)
     assert np.median(off[:, 1]) < 6.0
     assert np.quantile(off[:, 1], 0.9) < 12.0, "twice as far as with its marker; a fit finds most from there"
+
+
+def test_what_may_be_a_leg_is_no_ski(of: TrackedHill) -> None:
+    """Dark bars are drawn into images without a jumper; where legs are known to lie there, they say nothing."""
+    pulses = of.in_sight("P3")[::4]
+    bindings = np.array([[of.truth[p]["points"][label] for label in ("P3", "P4")] for p in pulses])
+    along = 1.3 * np.array((np.cos(0.3), 0.0, np.sin(0.3)))
+    drawn = [
+        [_with_bars(view, [(foot - along, foot + along) for foot in feet]) for view in views]
+        for views, feet in zip(views_of(of, [30] * len(pulses)), bindings, strict=True)
+    ]
+    legs = [np.array([(foot, foot + way) for foot in feet for way in (along, -along)]) for feet in bindings]
+    told = [
+        [replace(view, legs=Legs(ends, np.full((len(ends), 2), 0.05))) for view in views]
+        for views, ends in zip(drawn, legs, strict=True)
+    ]
+    known, covariance = np.ones((len(pulses), 2), bool), np.tile(BINDING_M**2 * np.eye(3), (len(pulses), 2, 1, 1))
+    like_skis, like_legs = (
+        seek_directions(views, bindings, covariance, known, np.array(pulses) / RATE_HZ, AXES).gain
+        for views in (drawn, told)
+    )
+    assert np.median(like_skis) > 20.0
+    assert np.median(like_legs) < 5.0
+
+
+def _with_bars(view: SkiView, bars: Sequence[tuple[Floats, Floats]]) -> SkiView:
+    def part(low: Integers, high: Integers) -> Region | None:
+        region = view.part(low, high)
+        if region is None:
+            return None
+        grey = region.grey.copy()
+        for ends in bars:
+            xy = view.camera.project(np.array(ends)) - (region.x, region.y)
+            if np.isfinite(xy).all():
+                first, last = np.rint(xy).astype(int).tolist()
+                cv2.line(grey, first, last, 20.0, 3)
+        return replace(region, grey=grey)
+
+    return replace(view, part=part)

@@ -68,6 +68,7 @@ def orient(
     network, held = _with_interior(network, uncertain_interior)
     network, notes = _prepared(network, alternative, moving)
     outcome, stages, left_out = _oriented(network)
+    outcome = replace(outcome, adjustment=replace(outcome.adjustment, cautious=True))
     refuse_ambiguous(network, outcome.adjustment)
     refuse_contradicted(network, outcome.adjustment)
     return Orientation(outcome, stages, (*held, *notes, *map(str, left_out)), tuple(left_out))

@@ -71,6 +71,8 @@ class Adjustment:
         equations: observation equations at the solution, whitened.
         cofactors: (u, u), Q of all unknowns in the chosen datum; unknowns by `problem.unknowns`.
         controlled: redundancy of every observation.
+        cautious: sigmas of few redundant observations are not shrunk by chance (`posterior_scale`); else they carry the
+            estimated sigma0 in any case.
     """
 
     problem: Problem
@@ -80,6 +82,7 @@ class Adjustment:
     equations: Equations
     cofactors: Floats
     controlled: Redundancy
+    cautious: bool = False
 
     @property
     def network(self) -> Network:
@@ -109,8 +112,8 @@ class Adjustment:
 
     @property
     def scale(self) -> float:
-        """The factor from the root of a cofactor to a standard deviation, in a-priori sigma0: `posterior_scale`."""
-        return posterior_scale(self.equations.square_sum, self.redundancy)
+        """The factor from the root of a cofactor to a standard deviation, in a-priori sigma0."""
+        return posterior_scale(self.equations.square_sum, self.redundancy) if self.cautious else self.ratio
 
     @property
     def sigma0(self) -> float | None:

@@ -192,7 +192,7 @@ def test_a_small_sigma0_of_few_observations_shrinks_no_sigma() -> None:
     beyond = small = 0
     for _ in range(120):
         case = observed((camera,), rng.uniform(-4.0, 4.0, (4, 3)), 4, rng)
-        a = adjust_once(case.network, _truth(case))
+        a = replace(adjust_once(case.network, _truth(case)), cautious=True)
         small += a.ratio < 0.3
         beyond += _off(case, a) > 5.0
     assert small > 5

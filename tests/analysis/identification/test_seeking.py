@@ -73,7 +73,7 @@ def test_in_a_hurry_skis_are_sought_in_the_last_moments_only(monkeypatch: pytest
     sought: list[Flags] = []
 
     def noted(*given: Any) -> list[MeasuredSkis]:
-        sought.append(given[5])
+        sought.append(given[-1])
         return [{}] * len(made.candidates)
 
     monkeypatch.setattr(identification, "measure_skis", noted)

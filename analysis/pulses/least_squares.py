@@ -19,9 +19,9 @@ _MOST_STEPS = 15
 _STEP_SIGMAS = 1e-4  # of a sigma
 _STEP_RELATIVE = 1e-11  # of the distance from the cameras: smaller steps are rounding
 _MIN_EIGENVALUE = 1e-12  # of the scaled normal matrix
-_LARGEST_SIGMA = 1 / 3  # of the reach: with a larger one the rays or planes coincide within their accuracy
+_LARGEST_SIGMA = 1 / 5  # of the reach: with a larger one the rays or planes coincide within their accuracy
 _LINEAR_WITHIN = 2.0  # standard deviations
-_NOT_LINEAR = 0.5  # standard deviations by which a result may miss its place there
+_NOT_LINEAR = 1.0  # standard deviations by which a result may miss its place there
 _CONTROLLED = 1e-7  # part of the weight of an observation below which nothing controls it
 
 

@@ -41,7 +41,6 @@ _ASIDE_SIGMAS, _STEP_M, _BESIDE_M = 1.8, 0.03, 0.09
 _ASIDE_SIGMA_M: Final = 0.05  # of the axis from a binding's marker, across it
 SHARP_M: Final = 0.1  #: standard deviation of a binding from which on it is known vaguely alone
 _TAKEN_M, _TAKEN_PX = 0.05, 2.0  # half the width of what another ski explains: itself, and the blur
-_BESIDE_LEG_M: Final = 0.06  # a marker lies so far from the axis of a leg, and a knee from the line to the hip
 _REACH_M: Final = (-1.28, 1.52)
 _ALONG_M: Final = 0.08
 _ALIKE_PX: Final = 8.0  # along a ski, over which errors of the model are alike
@@ -330,7 +329,7 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
     inside = inside.reshape(shape)
     if len(view.legs.ends):
         places = np.stack((x + region.x, y + region.y), axis=-1).astype(float)
-        inside &= ~view.on_legs(places, _BESIDE_LEG_M).reshape(shape)
+        inside &= ~view.on_legs(places).reshape(shape)
     if taken is not None:
         ends = taken[0] + np.array(USUAL_SHAPE[1:])[:, None] * taken[1] + view.shift
         places = np.stack((x + region.x, y + region.y), axis=-1).reshape(-1, 2)

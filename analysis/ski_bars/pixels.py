@@ -17,7 +17,8 @@ from rig.arrays import Flags, Floats, Integers
 REACH_PX: Final = 4.0
 #: Px along a ski that are taken together: the errors of the model are alike over more.
 CELL_PX: Final = 2
-_LEG_M: Final = (0.05, 0.09)  # half the width of a leg at foot and hip
+#: Half the width of a leg at the foot, and at the hip with what the marker there lies beside its axis, m.
+_LEG_M: Final = (0.07, 0.15)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,10 +75,10 @@ class SkiView:
     shift: Floats
     legs: Legs = field(default_factory=Legs)
 
-    def on_legs(self, xy: Floats, beside_m: float = 0.0) -> Flags:
-        """Which places (..., 2) in the image may show a leg, or what is `beside_m` beside it."""
+    def on_legs(self, xy: Floats) -> Flags:
+        """Which places (..., 2) in the image may show a leg."""
         there = np.zeros(xy.shape[:-1], bool)
-        for leg, half_m in zip(self.legs.ends + self.shift, np.hypot(_LEG_M, self.legs.sigma) + beside_m, strict=True):
+        for leg, half_m in zip(self.legs.ends + self.shift, np.hypot(_LEG_M, self.legs.sigma), strict=True):
             px = self.camera.project(leg)
             if np.isfinite(px).all():
                 scale = self.camera.camera.interior[0] / np.linalg.norm(leg - self.camera.position, axis=1)

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -12,7 +13,7 @@ from season.campaign import Campaign
 from season.running.logs import SeasonLog, find_logs, with_outcomes
 from season.running.outcome import LogState, Outcome, decoded
 from season.running.state import NAME, SeasonState
-from season.running.stores import Options, read_outcomes
+from season.running.stores import Options, left_behind, read_outcomes
 from season.running.task import give_up, measure
 
 _LOCK: Final = ".lock"
@@ -71,10 +72,13 @@ def measure_logs(
     todo = [log for log in logs if not log.is_settled or (again and _failed(log))]
     state.write()
     if todo:
+        left = left_behind(log.url for log in logs)
         try:
             logs = with_outcomes(logs, _measure(todo, campaign, state, dashboard, started, progress))
         finally:
             state.write()
+        for path in left:
+            shutil.rmtree(path, ignore_errors=True)
     return logs, state
 
 

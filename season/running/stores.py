@@ -8,7 +8,7 @@ import os
 import shutil
 import tempfile
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -164,6 +164,19 @@ def new_result(url: str, options: Options) -> Iterator[Path]:
     except BaseException:
         shutil.rmtree(made, ignore_errors=True)
         raise
+
+
+def left_behind(urls: Iterable[str]) -> list[Path]:
+    """Hidden folders beside logs of this computer in which killed workers wrote results."""
+    names: dict[Path, set[str]] = {}
+    for target in (Path(result_url(url)) for url in urls if not is_remote(url)):
+        names.setdefault(target.parent, set()).add(target.name)
+    return [
+        path
+        for folder, targets in names.items()
+        for path in folder.glob(f".*{RESULT}.*")
+        if path.name[1:].partition(f"{RESULT}.")[0] + RESULT in targets
+    ]
 
 
 def replace_outcome(url: str, content: bytes, options: Options) -> None:

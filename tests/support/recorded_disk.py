@@ -257,13 +257,13 @@ class History:
     def _certain_names(self, changes: Sequence[Call], end: int) -> int:
         """How many of the changes of names are durable."""
         durable = 0
-        folders = dict(self._folders)
+        names = Names(folders=dict(self._folders))
         for place, call in enumerate(changes, 1):
-            if call.what is What.FOLDER:
-                folders[call.path] = call.file
-            for path in filter(None, (call.path, call.new)):
-                if self._is_durable(folders.get(str(Path(path).parent), -1), call, end):
-                    durable = place
+            paths = [str(Path(path).parent) for path in (call.path, call.new) if path]
+            folders = [names.folders.get(path, -1) for path in paths]
+            if any(self._is_durable(folder, call, end) for folder in folders):
+                durable = place
+            names.apply(call)
         return durable
 
     def _is_durable(self, file: int, call: Call, end: int) -> bool:

@@ -327,14 +327,12 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
     )
     inside = (x >= 0) & (x <= region.grey.shape[1] - 1) & (y >= 0) & (y <= region.grey.shape[0] - 1)
     inside = inside.reshape(shape)
-    if len(view.legs.ends):
-        places = np.stack((x + region.x, y + region.y), axis=-1).astype(float)
-        inside &= ~view.on_legs(places).reshape(shape)
-    if taken is not None:
-        ends = taken[0] + np.array(USUAL_SHAPE[1:])[:, None] * taken[1] + view.shift
-        places = np.stack((x + region.x, y + region.y), axis=-1).reshape(-1, 2)
-        away = to_piece(places.astype(float), view.camera.project(ends)).reshape(shape)
-        inside &= away > _TAKEN_M * scale + _TAKEN_PX
+    if len(view.legs.ends) or taken is not None:
+        places = np.stack((x + region.x, y + region.y), axis=-1).astype(float).reshape(*shape, 2)
+        inside &= ~view.on_legs(places)
+        if taken is not None:
+            ends = taken[0] + np.array(USUAL_SHAPE[1:])[:, None] * taken[1] + view.shift
+            inside &= to_piece(places, view.camera.project(ends)) > _TAKEN_M * scale + _TAKEN_PX
     variance = sigma**2
     scene = _density(grey - behind, variance)
     nothing = np.log(0.5 * scene + 0.5 * _ANYTHING)

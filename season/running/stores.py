@@ -147,7 +147,7 @@ def new_result(url: str, options: Options) -> Iterator[Path]:
     target = Path(result_url(url))
     # What a worker that was killed has left; one that lost the scheduler and still works on this log fails by it, which
     # is right: its result is not wanted any more.
-    for left in target.parent.glob(f".{_escaped(target.name)}.*"):
+    for left in left_behind([url]):
         shutil.rmtree(left)
     made = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
     made.mkdir()
@@ -175,7 +175,7 @@ def left_behind(urls: Iterable[str]) -> list[Path]:
         path
         for folder, targets in names.items()
         for path in folder.glob(f".*{RESULT}.*")
-        if path.name[1:].partition(f"{RESULT}.")[0] + RESULT in targets
+        if path.name[1:].rpartition(f"{RESULT}.")[0] + RESULT in targets
     ]
 
 
@@ -233,7 +233,3 @@ def _stamp(info: Mapping[str, Any]) -> str:
         return f"{info['size']}-{Path(info['name']).stat().st_mtime_ns}"
     version = info.get("ETag") or info.get("etag") or info.get("LastModified") or info.get("mtime") or ""
     return f"{info['size']}-{str(version).strip(chr(34))}"
-
-
-def _escaped(name: str) -> str:
-    return "".join(f"[{each}]" if each in "*?[" else each for each in name)

@@ -9,15 +9,24 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from rig.api.measuring import MeasuringStep
-from rig.background.messages import End, Progress
+from rig.background.messages import End
 from rig.background.program import Teller, serve
 from rig.errors import StorageError
 from rig.host.disk import ask_free_bytes, replace_file, sync
 from rig.phrase import phrase
 from service.offloading.orders import Confirm, ConfirmUpload, Copy, Upload
 from service.offloading.uploading import confirm_upload, upload
-from service.offloading.verified_copy import checksum, copy_file, files_of, sum_line, sum_of
+from service.offloading.verified_copy import (
+    another_log,
+    bytes_of,
+    changed_copy,
+    checksum,
+    copy_file,
+    files_of,
+    progress_of,
+    sum_line,
+    sum_of,
+)
 
 _LOG: Final = ".mcap"
 
@@ -28,24 +37,18 @@ def _copy(asked: Copy, tell: Teller) -> End:
         text = "{folder}: the folder for copies is not there; connect its disk, and the copy is made"
         raise StorageError(phrase("copying_no_folder", text, folder=str(to)))
     wanted = [source for source in asked.paths if source.exists() and not _is_copied(source, to / source.name)]
-    sizes = sum(path.stat().st_size for source in wanted for path in files_of(source))
+    size = bytes_of(wanted)
     there = sum(part.stat().st_size for source in wanted if (part := _part(source, to)).is_file())
-    if ask_free_bytes(to) < sizes - there:
+    if ask_free_bytes(to) < size - there:
         raise StorageError(
             phrase(
                 "copying_no_room",
                 "{folder}: has not the {gb:.1f} GB free that the copy takes; make room there, and the copy is made",
                 folder=str(to),
-                gb=(sizes - there) / 1e9,
+                gb=(size - there) / 1e9,
             )
         )
-    done = 0
-
-    def told(count: int) -> None:
-        nonlocal done
-        done += count
-        tell(Progress(step=MeasuringStep.COPYING, share=done / (2 * sizes)))
-
+    told = progress_of(size, tell)
     for source in wanted:
         if source.suffix == _LOG and (to / source.name).exists():
             _accept(source, to / source.name, told)
@@ -60,9 +63,7 @@ def _confirm(asked: Confirm, _: Teller) -> End:
     for path in (asked.log, asked.copy):
         if checksum(path, lambda _: None) != wanted:
             sum_of(asked.copy).unlink()
-            raise StorageError(
-                f"{asked.copy}: is not what was copied there any more; move it away, and the recording is copied again"
-            )
+            raise changed_copy(asked.copy)
     return End()
 
 
@@ -91,7 +92,7 @@ def _accept(source: Path, target: Path, told: Callable[[int], None]) -> None:
     """
     digest = checksum(source, told)
     if checksum(target, told) != digest:
-        raise _another(target)
+        raise another_log(target)
     _keep_sum(target, digest)
 
 
@@ -108,13 +109,8 @@ def _is_copied(source: Path, target: Path) -> bool:
     if source.suffix != _LOG or not target.exists():
         return False
     if source.stat().st_size != target.stat().st_size:
-        raise _another(target)
+        raise another_log(target)
     return sum_of(target).exists()
-
-
-def _another(target: Path) -> StorageError:
-    text = "{path}: is another log of this name; move it away, and the copy is made"
-    return StorageError(phrase("copying_other_log", text, path=str(target)))
 
 
 def _part(source: Path, to: Path) -> Path:

@@ -10,17 +10,26 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from rig.api.measuring import MeasuringStep
-from rig.background.messages import End, Progress
+from rig.background.messages import End
 from rig.background.program import Teller
 from rig.errors import StorageError
 from rig.host.files import open_to_read
 from rig.phrase import phrase
 from service.offloading.orders import ConfirmUpload, Upload
-from service.offloading.verified_copy import SUM, checksum, files_of, sum_line
+from service.offloading.verified_copy import (
+    PIECE,
+    SUM,
+    another_log,
+    bytes_of,
+    changed_copy,
+    checksum,
+    digest_of,
+    files_of,
+    progress_of,
+    sum_line,
+)
 
 _LOG: Final = ".mcap"
-_PIECE: Final = 1 << 22
 #: Bytes of a piece of an upload: the least of S3 is 5 MB, and it takes 10 000 pieces.
 _BLOCK: Final = 1 << 26
 
@@ -33,14 +42,7 @@ def upload(asked: Upload, tell: Teller) -> End:
     """
     with _opened(asked) as (store, base):
         wanted = [source for source in asked.paths if source.exists() and not _is_copied(source, store, base)]
-        sizes = sum(path.stat().st_size for source in wanted for path in files_of(source))
-        done = 0
-
-        def told(count: int) -> None:
-            nonlocal done
-            done += count
-            tell(Progress(step=MeasuringStep.COPYING, share=done / (2 * sizes)))
-
+        told = progress_of(bytes_of(wanted), tell)
         for source in wanted:
             if source.suffix == _LOG:
                 _upload_log(source, store, f"{base}/{source.name}", told)
@@ -60,10 +62,7 @@ def confirm_upload(asked: ConfirmUpload, _: Teller) -> End:
         wanted = store.cat_file(copy + SUM).decode().partition(" ")[0]
         if checksum(asked.log, lambda _: None) != wanted or _checksum(store, copy, lambda _: None) != wanted:
             store.rm_file(copy + SUM)
-            raise StorageError(
-                f"{asked.store}/{asked.log.name}: is not what was copied there any more; move it away, and the "
-                "recording is copied again"
-            )
+            raise changed_copy(f"{asked.store}/{asked.log.name}")
     return End()
 
 
@@ -95,7 +94,7 @@ def _is_copied(source: Path, store: Any, base: str) -> bool:
     if source.suffix != _LOG or not store.exists(target):
         return False
     if store.info(target)["size"] != source.stat().st_size:
-        raise _another(target)
+        raise another_log(target)
     return bool(store.exists(target + SUM))
 
 
@@ -104,7 +103,7 @@ def _upload_log(source: Path, store: Any, target: str, told: Callable[[int], Non
     if store.exists(target):
         digest = checksum(source, told)
         if _checksum(store, target, told) != digest:
-            raise _another(target)
+            raise another_log(target)
     else:
         digest = _put(source, store, target, told)
     store.pipe_file(target + SUM, sum_line(digest, source.name))
@@ -137,7 +136,7 @@ def _put(source: Path, store: Any, target: str, told: Callable[[int], None]) -> 
     writer = store.open(target, "wb", block_size=_BLOCK)
     try:
         with open_to_read(source, links=False) as reader:
-            while piece := reader.read(_PIECE):
+            while piece := reader.read(PIECE):
                 writer.write(piece)
                 digest.update(piece)
                 told(len(piece))
@@ -154,14 +153,5 @@ def _put(source: Path, store: Any, target: str, told: Callable[[int], None]) -> 
 
 def _checksum(store: Any, target: str, told: Callable[[int], None]) -> str:
     """SHA-256 of an object, hexadecimal."""
-    digest = hashlib.sha256()
-    with store.open(target, "rb", block_size=_PIECE, cache_type="readahead") as reader:
-        while piece := reader.read(_PIECE):
-            digest.update(piece)
-            told(len(piece))
-    return digest.hexdigest()
-
-
-def _another(target: str) -> StorageError:
-    text = "{path}: is another log of this name; move it away, and the copy is made"
-    return StorageError(phrase("copying_other_log", text, path=target))
+    with store.open(target, "rb", block_size=PIECE, cache_type="readahead") as reader:
+        return digest_of(reader, told)

@@ -2,14 +2,18 @@
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from rig.api.measuring import MeasuringStep
+from rig.background.messages import Progress
+from rig.background.program import Teller
 from rig.errors import StorageError
 from rig.host.files import open_to_read
+from rig.phrase import phrase
 
-_PIECE: Final = 1 << 22
+PIECE: Final = 1 << 22  #: bytes that are read at a time
 #: Ending of the file with the checksum of a copied log, beside it.
 SUM: Final = ".sha256"
 #: Bytes that wait in memory for the other disk: few, so that memory and disks stay free for a recording.
@@ -42,7 +46,7 @@ def copy_file(source: Path, part: Path, told: Callable[[int], None]) -> str:
             told(len(piece))
         writer.truncate()
         unsynced = 0
-        while piece := reader.read(_PIECE):
+        while piece := reader.read(PIECE):
             writer.write(piece)
             digest.update(piece)
             unsynced += len(piece)
@@ -83,18 +87,58 @@ def checksum(path: Path, told: Callable[[int], None]) -> str:
     Raises:
         OSError: the disk refuses.
     """
-    digest = hashlib.sha256()
     with open_to_read(path, links=False) as reader:
         os.posix_fadvise(reader.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
-        while piece := reader.read(_PIECE):
-            digest.update(piece)
-            told(len(piece))
+        return digest_of(reader, told)
+
+
+def digest_of(reader: BinaryIO, told: Callable[[int], None]) -> str:
+    """SHA-256 of what comes, hexadecimal.
+
+    Args:
+        reader: where it comes from.
+        told: called with the bytes of each piece.
+    """
+    digest = hashlib.sha256()
+    while piece := reader.read(PIECE):
+        digest.update(piece)
+        told(len(piece))
     return digest.hexdigest()
+
+
+def bytes_of(sources: Iterable[Path]) -> int:
+    """Size of files, and of the files in folders and below."""
+    return sum(path.stat().st_size for source in sources for path in files_of(source))
+
+
+def progress_of(size: int, tell: Teller) -> Callable[[int], None]:
+    """Takes the bytes of each piece that is written or read back, and tells how far the copying of so many bytes is."""
+    done = 0
+
+    def told(count: int) -> None:
+        nonlocal done
+        done += count
+        tell(Progress(step=MeasuringStep.COPYING, share=done / (2 * size)))
+
+    return told
+
+
+def another_log(target: object) -> StorageError:
+    """Another log has the name of a copy."""
+    text = "{path}: is another log of this name; move it away, and the copy is made"
+    return StorageError(phrase("copying_other_log", text, path=str(target)))
+
+
+def changed_copy(target: object) -> StorageError:
+    """A copy, or its log, is not what was copied."""
+    return StorageError(
+        f"{target}: is not what was copied there any more; move it away, and the recording is copied again"
+    )
 
 
 def _agreeing(reader: BinaryIO, writer: BinaryIO) -> Iterator[bytes]:
     """The pieces from the beginning that both files have; both stand behind the last of them afterwards."""
-    while piece := writer.read(_PIECE):
+    while piece := writer.read(PIECE):
         place = reader.tell()
         if reader.read(len(piece)) != piece:
             reader.seek(place)

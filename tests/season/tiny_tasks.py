@@ -33,13 +33,15 @@ class Heard:
 
 
 def note(path: Path) -> str:
-    """A task: notes that it runs; kills its worker, or fails, if its name says so."""
+    """A task: notes that it runs; kills its worker, or fails, if its name says so, or if each release gives memory back."""
     with path.open("a") as file:
         file.write(f"{os.getpid()}\n")
     if "deadly" in path.name:
         os.kill(os.getpid(), signal.SIGKILL)
     if "wrong" in path.name:
         raise ValueError("wrong")
+    if "MALLOC_TRIM_THRESHOLD_" in os.environ:
+        raise ValueError("page faults make jumps take a third longer")
     return path.name
 
 

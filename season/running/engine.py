@@ -29,8 +29,9 @@ _LOOK_S: Final = 2.0
 _PATIENCE: Final = 60
 _LOCAL: Final = "127.0.0.1"
 _SAFE_PATH: Final = "PYTHONSAFEPATH"
-#: Results are on the disk: nothing is kept in a worker's memory that it could move there or wait for. Dask's environment
-#: of workers has memory given back at each release (MALLOC_TRIM_THRESHOLD_); a quarter of a jump's time would be page faults.
+#: Results are on the disk: nothing is kept in a worker's memory that it could move there or wait for. Dask's
+#: environment of workers has memory given back at each release (MALLOC_TRIM_THRESHOLD_); a quarter of a jump's time
+#: would be page faults.
 _CONFIGURED: Final = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
     "distributed.scheduler.allowed-failures": 0,

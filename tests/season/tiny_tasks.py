@@ -33,7 +33,7 @@ class Heard:
 
 
 def note(path: Path) -> str:
-    """A task: notes that it runs; kills its worker, or fails, if its name says so, or if each release gives memory back."""
+    """A task: notes that it runs; kills its worker or fails, if its name says so or each release gives memory back."""
     with path.open("a") as file:
         file.write(f"{os.getpid()}\n")
     if "deadly" in path.name:

@@ -14,16 +14,15 @@ import numpy as np
 
 from analysis.candidates.model import SecondLook
 from analysis.identification.over_time.flights import Flight
-from analysis.identification.over_time.prediction import Part, predict
 from analysis.identification.over_time.window import Window
+from analysis.identification.ski_turns import FEWEST_TELLING, SOUGHT_RAD, led, smooth
 from analysis.identification.space.body import BINDINGS, usual_difference
-from analysis.identification.space.views import Views, gate
+from analysis.identification.space.views import Views
 from analysis.measurements.model import SIDES, SkiMeasurement
 from analysis.ski_bars.bars import OF_POSE, SKIS, USUAL_SHAPE, USUAL_SHAPE_SIGMA, ExpectedBars, Poses
-from analysis.ski_bars.directions import OPENING, SHARP_M, is_sharp, seek_directions
+from analysis.ski_bars.directions import SHARP_M, is_sharp, seek_directions
 from analysis.ski_bars.fitting import FittedBars, fit_bars
 from analysis.ski_bars.pixels import Legs, SkiView
-from photogrammetry.jumper.stick_model import by_slope_and_heading, slope_and_heading
 from rig.arrays import Flags, Floats
 
 #: Skis by side in each camera of a pulse.
@@ -31,20 +30,12 @@ MeasuredSkis = Mapping[str, Mapping[str, SkiMeasurement]]
 
 _VAGUE_M: Final = 0.2  #: standard deviation of the place of a binding from which its ski is sought through all pulses
 _FEWEST: Final = 2  #: images that show a binding
-SOUGHT_RAD: Final = np.radians((6.0, 2.0))  #: standard deviations of a direction that was sought: to the side, up
 _BINDING_M: Final = 0.06  #: of a binding's marker from the axis of its ski, in any direction
 _STEADY_M: Final = 0.015  #: of that distance from pulse to pulse
+_PASSES: Final = 3  #: over the pulses, each from where the last one leads
 _TELLING: Final = 12  #: pulses that tell how long the skis are
-_FEWEST_TELLING: Final = 3  #: of each ski, so that it is believed at all
 _BY_CHANCE: Final = 0.1  #: share of the pulses in which what is no ski may be fitted as one
 _SHAPE_M: Final = (0.005, 0.03, 0.03)  #: what bend and visible ends differ by from pulse to pulse
-#: Slope and heading (rad) of both skis as sums of their mean and of half their difference: (mean, velocity,
-#: acceleration), and the change of the acceleration within 0.1 s.
-_MIXING: Final = np.array([(1.0, -1.0), (1.0, 1.0)])
-_PARTS: Final = (
-    Part(np.zeros((2, 2)), (0.4, 1.0, 10.0), 15.0),
-    Part(np.array(((0.0, OPENING / 2), (0.0, 0.0))), (0.2, 0.5, 5.0), 8.0),
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,14 +101,27 @@ def measure_skis(
     pair = SkiPair()
     turning = np.tile(np.diag(SOUGHT_RAD**2), (SKIS, 1, 1))
 
-    def fitted(t: int) -> FittedBars:
-        return pair.fitted(pulses[t], bindings.at(t), sought.direction[t], turning, known[t])
+    def fitted(t: int, direction: Floats) -> FittedBars:
+        return pair.fitted(pulses[t], bindings.at(t), direction, turning, known[t])
 
     telling = [int(t) for t in np.argsort(-sought.gain.sum(axis=1))[:_TELLING] if known[t].any()]
-    pair.learn([(fitted(t), bindings.at(t)) for t in telling])
-    found = [fitted(t) if known[t].any() else None for t in range(len(window))]
-    seen = np.array([(False, False) if fit is None else fit.seen for fit in found])
-    seen = _smooth(seen, found, window.time_s, flight)
+    pair.learn([(fitted(t, sought.direction[t]), bindings.at(t)) for t in telling])
+    found = [fitted(t, sought.direction[t]) if known[t].any() else None for t in range(len(window))]
+    for _ in range(_PASSES):
+        seen = smooth(found, window.time_s, flight)
+        toward, leads = led(found, seen, window.time_s, flight)
+        leads &= known & ~seen
+        more = False
+        for t, fit in enumerate(found):
+            if fit is None or not leads[t].any():
+                continue
+            again = fitted(t, np.where(leads[t, :, None], toward[t], fit.poses.direction))
+            if sum(again.seen) >= sum(fit.seen) and not np.any(seen[t] & ~np.array(again.seen)):
+                more |= sum(again.seen) > sum(fit.seen)
+                found[t] = again
+        if not more:
+            break
+    seen = smooth(found, window.time_s, flight)
     seen &= seen.sum(axis=0) > _BY_CHANCE * known.sum(axis=0)
     return [{} if fit is None else measured(fit, own) for fit, own in zip(found, seen, strict=True)]
 
@@ -186,11 +190,11 @@ class SkiPair:
         """Learn from some pulses: skis as fitted, and the places (2,) of the markers of their bindings."""
         for k in range(SKIS):
             own = [(fit, at) for fit, at in seen if fit.seen[k]]
-            if len(own) < _FEWEST_TELLING:
+            if len(own) < FEWEST_TELLING:
                 continue
             self._shape[k], self._shape_sigma[k] = np.median([fit.shape[k] for fit, _ in own], axis=0), _SHAPE_M
             marked = [(fit, at.xyz[k]) for fit, at in own if is_sharp(at.covariance[k])]
-            if len(marked) < _FEWEST_TELLING:
+            if len(marked) < FEWEST_TELLING:
                 continue
             off = [_frames(fit.poses.direction)[k] @ (fit.poses.point[k] - xyz) for fit, xyz in marked]
             self._offset[k], self._offset_sigma[k] = np.median(off, axis=0), _STEADY_M
@@ -200,40 +204,6 @@ def _frames(direction: Floats) -> Floats:
     """Unit vectors (2, 3, 3) along each ski, to the side and in the vertical plane, as rows."""
     aside, normal = Poses(np.zeros((SKIS, 3)), direction).axes()
     return np.stack((direction, aside, normal), axis=1)
-
-
-def by_turns(poses: Poses, axes: Floats) -> Floats:
-    """Derivatives (2, 2, 2) of slope and heading of both skis by their turns (`Poses.axes`).
-
-    Args:
-        poses: of the skis.
-        axes: (3, 3) of the frame of slope and heading, as rows.
-    """
-    turns = np.stack(poses.axes(), axis=-1)
-    return np.asarray(np.linalg.pinv(by_slope_and_heading(poses.direction @ axes.T)) @ axes @ turns)
-
-
-def _smooth(seen: Flags, fitted: Sequence[FittedBars | None], time_s: Floats, flight: Flight) -> Flags:
-    """Which of the seen skis (t, 2) do not contradict those of the other pulses."""
-    angles, spread = np.full((len(fitted), SKIS, 2), np.nan), np.full((len(fitted), SKIS, 2, 2), np.nan)
-    for t, k in np.argwhere(seen).tolist():
-        if (fit := fitted[t]) is None:
-            continue
-        own, turned = slice(OF_POSE * k + 3, OF_POSE * (k + 1)), by_turns(fit.poses, flight.axes)[k]
-        angles[t, k] = slope_and_heading(fit.poses.direction[k] @ flight.axes.T)
-        spread[t, k] = turned @ fit.covariance[own, own] @ turned.T
-    kept = seen.copy()
-    while kept.any():
-        values = np.where(kept[..., None], angles, np.nan), np.where(kept[..., None, None], spread, np.nan)
-        others = predict(time_s, *values, _PARTS, _MIXING)
-        off = np.where(kept[..., None], angles - others.xyz, 0.0)
-        total = others.covariance + np.where(kept[..., None, None], spread, np.eye(2))
-        misfit = (off * np.linalg.solve(total, off[..., None])[..., 0]).sum(axis=-1)
-        if misfit.max() < gate(2):
-            break
-        kept[np.unravel_index(int(misfit.argmax()), misfit.shape)] = False
-    kept &= kept.sum(axis=0) >= _FEWEST_TELLING
-    return kept
 
 
 def measured(fit: FittedBars, seen: Flags) -> MeasuredSkis:

@@ -10,7 +10,7 @@ from scipy.special import chdtri
 from analysis.ski_bars.bars import OF_POSE, OF_SHAPE, SKIS, ExpectedBars, Poses
 from analysis.ski_bars.estimate import WORST_MODEL, BarFit, Estimate
 from analysis.ski_bars.image_lines import REDUNDANCY, ImageLine, image_lines
-from analysis.ski_bars.model import POSE, SHAPE, BarModel
+from analysis.ski_bars.model import POSE, SHAPE, SHOVEL_M, BarModel, hidden_by_boots
 from analysis.ski_bars.pixels import SkiView, pixels_around
 from rig.arrays import Flags, Floats
 
@@ -20,7 +20,11 @@ _WORST_PX: Final = 1.0  #: sigma of a line across it, at most
 _CONTRADICTION: Final = float(chdtri(REDUNDANCY, 1e-4))  #: one sound image in ten thousand contradicts the others more
 #: With width and brightness: noise alone gives more in one image of a million.
 _EVIDENCE: Final = float(chdtri(REDUNDANCY + 2, 1e-6))
+_FREE: Final = 0.5  #: of the pixels of a ski that show the static scene beside which no ski may be, at most
+_TELLING_CELLS: Final = 12  #: pixels that tell a ski from the static scene, at least, so that they tell anything
 _FEWEST: Final = 2  #: images that show a ski
+_SCENE_SIGMAS: Final = 3.0  # of the noise, within which a pixel shows the static scene
+_CORE: Final = 0.8  # of a pixel that a ski covers, so that it shows hardly anything else
 _STARTS: Final = 12  # of each ski, beside the expected place
 _REACH_SIGMAS, _WIDEST_M = 2.0, 0.15  # beside and beyond the expected skis, that are looked at
 _ENDS_M: Final = np.arange(-0.3, 0.35, 0.05)  # from where tail and tip usually are, m
@@ -95,7 +99,7 @@ def _judged(fit: BarFit, found: Estimate, good: Flags, lines: list[list[ImageLin
     }
     covariance = fit.covariance(found)
     step = found.x[POSE] - fit.mean[POSE]
-    seen = fit.used.sum(axis=0) >= _FEWEST
+    seen = (fit.used.sum(axis=0) >= _FEWEST) & ~_free(fit, found)
     return FittedBars(
         fit.model.poses(found.x),
         covariance[POSE, POSE],
@@ -123,6 +127,28 @@ def _good(lines: list[list[ImageLine | None]]) -> Flags:
             for of in lines
         ]
     )
+
+
+def _free(fit: BarFit, found: Estimate) -> Flags:
+    """(2,) which skis would hide what an image shows of the static scene.
+
+    An image that does not show a ski may be left out: something hides the ski, or the scene is as bright. Where the
+    scene itself is seen, and another grey than that of the ski, there is no ski.
+    """
+    pixels, seen = fit.pixels, found.seen
+    bright = found.x[fit.model.unknowns.brightness]
+    sigma = np.sqrt(pixels.noise)
+    scene = np.abs(pixels.grey - pixels.behind) < _SCENE_SIGMAS * sigma
+    free = np.zeros(SKIS, bool)
+    alone = ~hidden_by_boots(fit.model, found.x, pixels)
+    for k in np.flatnonzero(fit.used.any(axis=0)).tolist():
+        contrast = np.abs(bright[fit.used[:, k], k, None] - pixels.behind).min(axis=0)
+        telling = alone & (seen.cover[k] > _CORE) & (seen.cover[1 - k] < 1 - _CORE) & (seen.s[k] < SHOVEL_M)
+        telling &= contrast > 2 * _SCENE_SIGMAS * sigma
+        for c in np.flatnonzero(~fit.used[:, k]).tolist():
+            own = telling & (pixels.camera == c)
+            free[k] |= own.sum() >= _TELLING_CELLS and scene[own].mean() > _FREE
+    return free
 
 
 def _other_start(fit: BarFit, expected: ExpectedBars) -> Floats:

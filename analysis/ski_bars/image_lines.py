@@ -34,9 +34,9 @@ class ImageLine:
         lasting: px, the part of a shift and of a turn that errors of the model make: they are alike in the next images.
         binding: (2,) px, where the binding is on the axis.
         binding_covariance: (2, 2) px^2.
-        explained: share of the differences from the static scene along the ski that the model explains.
+        explained: share of the differences from scene and other ski, along the ski, that the model explains.
         visible: share of the ski's pixels that nothing else hides.
-        evidence: by how much the ski makes the sum of the squares of residuals over noise smaller.
+        evidence: by how much the ski, beside the other one, lessens the sum of squares of residuals over noise.
         contradiction: chi-squared of what the image says by itself against all images, redundancy `REDUNDANCY`.
     """
 
@@ -87,7 +87,9 @@ def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
             mine = slice(REDUNDANCY * k, REDUNDANCY * (k + 1))
             believed = robust[near]
             noise = float((believed * fit.pixels.noise[near]).sum())
-            front = (fit.pixels.grey - fit.pixels.behind)[near] ** 2
+            # Where both skis are one line in an image, it tells one ski and not two.
+            alone = fit.pixels.behind * (1 - seen.cover[1 - k]) + x[at.brightness[c, 1 - k]] * seen.cover[1 - k]
+            front = (fit.pixels.grey - alone)[near] ** 2
             without, unexplained = (float((believed * square).sum()) - noise for square in (front, off[near] ** 2))
             explained = 1 - max(unexplained, 0.0) / without if without > 0 else 0.0
             evidence = float((believed * (front - off[near] ** 2) / fit.pixels.noise[near]).sum())

@@ -8,15 +8,8 @@ from typing import Final
 import numpy as np
 
 from analysis.identification.over_time.prediction import Prediction
-from analysis.identification.ski_bars import (
-    SOUGHT_RAD,
-    Bindings,
-    MeasuredSkis,
-    SkiPair,
-    by_turns,
-    measured,
-    sought_from,
-)
+from analysis.identification.ski_bars import Bindings, MeasuredSkis, SkiPair, measured, sought_from
+from analysis.identification.ski_turns import SOUGHT_RAD, by_turns
 from analysis.identification.space.views import gate
 from analysis.ski_bars.bars import SKIS, Poses
 from analysis.ski_bars.directions import directions, seek_directions

@@ -1,20 +1,17 @@
 """The directions of skis are found from their bindings alone, through the pulses."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
-from analysis.candidates.foreground.background import Region
 from analysis.identification.markers.markers import ANYWHERE_M
 from analysis.identification.ski_bars import Bindings
 from analysis.ski_bars.directions import Directions, seek_directions
-from analysis.ski_bars.pixels import Legs, SkiView
-from rig.arrays import Floats, Integers
+from analysis.ski_bars.pixels import Legs
+from rig.arrays import Floats
 from tests.analysis.digitizing.following.tracked_hill import RATE_HZ, TrackedHill, hill
-from tests.analysis.ski_bars.hill_views import views_of
+from tests.analysis.ski_bars.hill_views import views_of, with_bars
 from tests.support.repeats import repeats
 
 BINDING_M = 0.01
@@ -74,7 +71,7 @@ def test_what_may_be_a_leg_is_no_ski(of: TrackedHill) -> None:
     bindings = np.array([[of.truth[p]["points"][label] for label in ("P3", "P4")] for p in pulses])
     along = 1.3 * np.array((np.cos(0.3), 0.0, np.sin(0.3)))
     drawn = [
-        [_with_bars(view, [(foot - along, foot + along) for foot in feet]) for view in views]
+        [with_bars(view, [(foot - along, foot + along) for foot in feet]) for view in views]
         for views, feet in zip(views_of(of, [30] * len(pulses)), bindings, strict=True)
     ]
     legs = [np.array([(foot, foot + way) for foot in feet for way in (along, -along)]) for feet in bindings]
@@ -89,19 +86,3 @@ def test_what_may_be_a_leg_is_no_ski(of: TrackedHill) -> None:
     )
     assert np.median(like_skis) > 20.0
     assert np.median(like_legs) < 5.0
-
-
-def _with_bars(view: SkiView, bars: Sequence[tuple[Floats, Floats]]) -> SkiView:
-    def part(low: Integers, high: Integers) -> Region | None:
-        region = view.part(low, high)
-        if region is None:
-            return None
-        grey = region.grey.copy()
-        for ends in bars:
-            xy = view.camera.project(np.array(ends)) - (region.x, region.y)
-            if np.isfinite(xy).all():
-                first, last = np.rint(xy).astype(int).tolist()
-                cv2.line(grey, first, last, 20.0, 3)
-        return replace(region, grey=grey)
-
-    return replace(view, part=part)

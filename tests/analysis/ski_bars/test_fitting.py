@@ -1,5 +1,6 @@
 """Both skis are found in all images together, off by what their sigmas say; what is no ski is refused."""
 
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -11,7 +12,9 @@ from analysis.ski_bars.bars import ExpectedBars, Poses
 from analysis.ski_bars.fitting import FittedBars, fit_bars
 from analysis.ski_bars.pixels import SkiView
 from bench.analysis.simulated import true_cameras
+from rig.arrays import Floats
 from tests.analysis.digitizing.following.tracked_hill import NAMES, TrackedHill, hill
+from tests.analysis.ski_bars.hill_views import views_of, with_bars
 
 SYSTEM = true_cameras()
 SIGMA = np.tile((0.03, 0.03, 0.03, 0.02, 0.02), 2)
@@ -61,3 +64,42 @@ def test_a_scene_without_skis_is_refused(of: TrackedHill) -> None:
     fitted = _fitted(of, of.in_sight("P1")[10], np.random.default_rng(4), empty=True)
     assert fitted.seen == (False, False)
     assert all(line is None for lines in fitted.lines.values() for line in lines)
+
+
+def _fitted_bars(of: TrackedHill, drawn: Callable[[str], Sequence[int]], off: Floats) -> FittedBars:
+    """Bars are fitted that are drawn without a jumper, the left one half a metre above the ski of a jump.
+
+    Args:
+        of: the hill.
+        drawn: by camera the skis that its image shows.
+        off: (2, 3) by how much farther the bindings are expected, m.
+    """
+    true = _drawn(of)
+    ends = [(X - 1.3 * d, X + 1.3 * d) for X, d in zip(true.point, true.direction, strict=True)]
+    views = [with_bars(view, [ends[k] for k in drawn(view.camera.name)]) for view in views_of(of, [30])[0]]
+    sigma = np.tile((0.03, 0.03, 0.03, 0.05, 0.05), 2)
+    shape, shape_sigma = np.tile(SHAPE, (2, 1)), np.tile(SHAPE_SIGMA, (2, 1))
+    expected = ExpectedBars(Poses(true.point + off, true.direction), np.diag(sigma**2), shape, shape_sigma)
+    return fit_bars(views, expected, near=True)
+
+
+def _drawn(of: TrackedHill) -> Poses:
+    """Where bars are drawn."""
+    true = _true(of, of.in_sight("P1")[20])
+    return Poses(true.point + np.array(((0.0, 0.0, 0.0), (0.0, 0.0, 0.5))), true.direction)
+
+
+def test_bars_that_all_images_show_are_fitted(of: TrackedHill) -> None:
+    assert _fitted_bars(of, lambda _: (0, 1), np.zeros((2, 3))).seen == (True, True)
+
+
+def test_what_one_ski_explains_shows_no_second_one(of: TrackedHill) -> None:
+    true = _drawn(of)
+    onto_the_right = np.stack((np.zeros(3), true.point[0] - true.point[1]))
+    assert sum(_fitted_bars(of, lambda _: (0,), onto_the_right).seen) < 2
+
+
+def test_no_ski_is_where_an_image_shows_the_scene(of: TrackedHill) -> None:
+    """Two images of three show the left ski; the third one shows what is behind it."""
+    fitted = _fitted_bars(of, lambda name: (0,) if name == NAMES[2] else (0, 1), np.zeros((2, 3)))
+    assert fitted.seen == (True, False)

@@ -9,11 +9,12 @@ from functools import partial
 from typing import Final
 
 from rig.errors import BadInputError, StorageError, SvevError
+from rig.host.object_store import Options
 from season.campaign import Campaign
 from season.running.logs import SeasonLog, find_logs, with_outcomes
 from season.running.outcome import LogState, Outcome, decoded
 from season.running.state import NAME, SeasonState
-from season.running.stores import Options, left_behind, read_outcomes
+from season.running.stores import left_behind, read_outcomes
 from season.running.task import give_up, measure
 
 _LOCK: Final = ".lock"

@@ -9,22 +9,20 @@ import shutil
 import tempfile
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import fsspec
-
 from rig.errors import BadInputError
 from rig.host.disk import replace_file, sync
+from rig.host.object_store import Options, object_store, why_not
 
 #: Ending of the folder with the result of a log.
 RESULT: Final = ".season"
 #: Name of the file in it that says what came of the log.
 OUTCOME: Final = "season.json"
 _LOG: Final = ".mcap"
-Options = Mapping[str, str | bool | int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,19 +58,19 @@ def listed(place: str, options: Options) -> list[Entry]:
     Raises:
         BadInputError: there is none, or the store does not answer.
     """
-    store, path = _store(place, options)
-    has_pattern = any(each in path for each in "*?[")
     try:
-        if has_pattern:
-            found = store.glob(path, detail=True)
-        elif path.endswith(_LOG):
-            found = {path: store.info(path)}
-        else:
-            found = store.glob(f"{path.rstrip('/')}/**/*{_LOG}", detail=True)
+        with _store(place, options) as (store, path):
+            if any(each in path for each in "*?["):
+                found = store.glob(path, detail=True)
+            elif path.endswith(_LOG):
+                found = {path: store.info(path)}
+            else:
+                found = store.glob(f"{path.rstrip('/')}/**/*{_LOG}", detail=True)
     except FileNotFoundError:
         found = {}
-    except (OSError, ValueError) as error:
-        raise BadInputError(f"{place}: cannot be listed ({error}); check the address and your rights") from error
+    except OSError as error:
+        text = f"{place}: cannot be listed ({why_not(error)}); check address, keys and network"
+        raise BadInputError(text) from error
     logs = {name: info for name, info in found.items() if name.endswith(_LOG) and info.get("type") == "file"}
     if not logs:
         raise BadInputError(f"{place}: no log (*{_LOG}) is there; correct the place in the campaign")
@@ -90,9 +88,14 @@ def read_results(urls: Sequence[str], name: str, options: Options) -> list[bytes
     remote = [url for url in urls if is_remote(url)]
     for scheme in {url.partition("://")[0] for url in remote}:
         of_scheme = [url for url in remote if url.startswith(f"{scheme}://")]
-        store, _ = _store(of_scheme[0], options)
-        paths = {store._strip_protocol(f"{result_url(url)}/{name}"): url for url in of_scheme}
-        for path, content in store.cat(list(paths), on_error="return").items():
+        try:
+            with _store(of_scheme[0], options) as (store, _):
+                paths = {store._strip_protocol(f"{result_url(url)}/{name}"): url for url in of_scheme}
+                found = store.cat(list(paths), on_error="return")
+        except OSError as error:
+            text = f"{of_scheme[0]}: its result cannot be read ({why_not(error)}); check address, keys and network"
+            raise BadInputError(text) from error
+        for path, content in found.items():
             if isinstance(content, Exception) and not isinstance(content, FileNotFoundError):
                 raise BadInputError(f"{paths[path]}: its result cannot be read ({content}); check your rights")
             there[paths[path]] = content if isinstance(content, bytes) else None
@@ -121,14 +124,14 @@ def at_hand(url: str, options: Options) -> Iterator[Path]:
     from recorder.log.session_changes import session_path  # noqa: PLC0415 - only logs elsewhere need it
 
     with tempfile.TemporaryDirectory(prefix="svev-season-") as folder:
-        store, path = _store(url, options)
-        log = Path(folder) / path.rsplit("/", 1)[1]
-        store.get_file(path, str(log))
-        beside = session_path(log)
-        try:
-            store.get_file(f"{path.rsplit('/', 1)[0]}/{beside.name}", str(beside))
-        except FileNotFoundError:
-            beside.unlink(missing_ok=True)
+        with _store(url, options) as (store, path):
+            log = Path(folder) / path.rsplit("/", 1)[1]
+            store.get_file(path, str(log))
+            beside = session_path(log)
+            try:
+                store.get_file(f"{path.rsplit('/', 1)[0]}/{beside.name}", str(beside))
+            except FileNotFoundError:
+                beside.unlink(missing_ok=True)
         yield log
 
 
@@ -186,25 +189,25 @@ def replace_outcome(url: str, content: bytes, options: Options) -> None:
         OSError: it cannot be written.
     """
     if is_remote(url):
-        store, path = _store(f"{result_url(url)}/{OUTCOME}", options)
-        store.pipe_file(path, content)
+        with _store(f"{result_url(url)}/{OUTCOME}", options) as (store, path):
+            store.pipe_file(path, content)
     else:
         replace_file(Path(result_url(url)) / OUTCOME, content, links=False)
 
 
 def _upload(folder: Path, url: str, options: Options) -> None:
-    store, target = _store(result_url(url), options)
-    if store.exists(target):
-        before = [str(path) for path in store.find(target)]
-        outcome = f"{target}/{OUTCOME}"
-        if outcome in before:
-            store.rm_file(outcome)
-        for path in before:
-            if path != outcome:
-                store.rm_file(path)
-    names = sorted((path.name for path in folder.iterdir()), key=lambda name: name == OUTCOME)
-    for name in names:  # what came of it is the last one
-        store.put_file(str(folder / name), f"{target}/{name}")
+    with _store(result_url(url), options) as (store, target):
+        if store.exists(target):
+            before = [str(path) for path in store.find(target)]
+            outcome = f"{target}/{OUTCOME}"
+            if outcome in before:
+                store.rm_file(outcome)
+            for path in before:
+                if path != outcome:
+                    store.rm_file(path)
+        names = sorted((path.name for path in folder.iterdir()), key=lambda name: name == OUTCOME)
+        for name in names:  # what came of it is the last one
+            store.put_file(str(folder / name), f"{target}/{name}")
 
 
 def _read_local(path: Path) -> bytes | None:
@@ -214,18 +217,9 @@ def _read_local(path: Path) -> bytes | None:
         return None
 
 
-def _store(url: str, options: Options) -> tuple[Any, str]:
-    """The store of an address, and the path in it.
-
-    Raises:
-        BadInputError: fsspec lacks the package for such addresses.
-    """
-    try:
-        store, path = fsspec.core.url_to_fs(url, **(options if is_remote(url) else {}))
-    except (ImportError, ValueError) as error:
-        raise BadInputError(f"{url}: {error}; install the package that fsspec needs for it, as s3fs for s3") from error
-    store.invalidate_cache()
-    return store, path
+def _store(url: str, options: Options) -> AbstractContextManager[tuple[Any, str]]:
+    """The store of an address, or the disk of a path, and the path in it."""
+    return object_store(url, options if is_remote(url) else {})
 
 
 def _stamp(info: Mapping[str, Any]) -> str:

@@ -17,10 +17,11 @@ from analysis.procedure.analyze import analyze
 from analysis.procedure.result_folder import write_folder
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
 from rig.errors import StorageError, SvevError
+from rig.host.object_store import Options
 from season.rows import write_rows
 from season.running.logs import SeasonLog
 from season.running.outcome import LogState, Orienting, Outcome, decoded, encoded, key_of, sha256_of
-from season.running.stores import OUTCOME, Options, at_hand, new_result, read_outcomes, replace_outcome
+from season.running.stores import OUTCOME, at_hand, new_result, read_outcomes, replace_outcome
 
 
 class _Clock:

@@ -14,8 +14,8 @@ from rig.background.program import Teller, serve
 from rig.errors import StorageError
 from rig.host.disk import ask_free_bytes, replace_file, sync
 from rig.phrase import phrase
-from service.offloading.orders import Confirm, ConfirmUpload, Copy, Upload
-from service.offloading.uploading import confirm_upload, upload
+from service.offloading.orders import Confirm, ConfirmUpload, Copy, TryStore, Upload
+from service.offloading.uploading import confirm_upload, try_store, upload
 from service.offloading.verified_copy import (
     another_log,
     bytes_of,
@@ -125,8 +125,8 @@ def _rename(part: Path, target: Path) -> None:
 
 
 def main() -> None:
-    """Copy, or confirm a copy."""
-    serve({Copy: _copy, Confirm: _confirm, Upload: upload, ConfirmUpload: confirm_upload})
+    """Copy, confirm a copy, or try a store."""
+    serve({Copy: _copy, Confirm: _confirm, Upload: upload, ConfirmUpload: confirm_upload, TryStore: try_store})
 
 
 if __name__ == "__main__":

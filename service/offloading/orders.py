@@ -40,6 +40,13 @@ class ConfirmUpload(Order):
     options: Mapping[str, str | bool | int]
 
 
+class TryStore(Order):
+    """Write a small object into an object store, read it back and remove it."""
+
+    store: str
+    options: Mapping[str, str | bool | int]
+
+
 def copying(paths: Sequence[Path], offload: OffloadSettings) -> Order:
     """The order to copy a log and what belongs to it."""
     if offload.to is not None:

@@ -5,6 +5,7 @@ copied when it was read back and its checksum stands beside it.
 """
 
 import hashlib
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,8 +15,9 @@ from rig.background.messages import End
 from rig.background.program import Teller
 from rig.errors import StorageError
 from rig.host.files import open_to_read
+from rig.host.object_store import object_store, why_not
 from rig.phrase import phrase
-from service.offloading.orders import ConfirmUpload, Upload
+from service.offloading.orders import ConfirmUpload, TryStore, Upload
 from service.offloading.verified_copy import (
     PIECE,
     SUM,
@@ -32,6 +34,8 @@ from service.offloading.verified_copy import (
 _LOG: Final = ".mcap"
 #: Bytes of a piece of an upload: the least of S3 is 5 MB, and it takes 10 000 pieces.
 _BLOCK: Final = 1 << 26
+#: The object that a trial leaves where it may not be removed.
+_TRIAL: Final = ".svev-doctor"
 
 
 def upload(asked: Upload, tell: Teller) -> End:
@@ -66,22 +70,38 @@ def confirm_upload(asked: ConfirmUpload, _: Teller) -> End:
     return End()
 
 
+def try_store(asked: TryStore, _: Teller) -> End:
+    """See whether a store takes an object, gives it back and removes it.
+
+    Raises:
+        StorageError: it does not.
+    """
+    with _opened(asked) as (store, base):
+        path, content = f"{base}/{_TRIAL}", uuid.uuid4().bytes
+        store.pipe_file(path, content)
+        if store.cat_file(path) != content:
+            raise StorageError(f"{asked.store}: does not give back what was written; check the object store")
+        try:
+            store.rm_file(path)
+        except OSError as error:
+            text = "{store}: takes copies and removes none ({why}); let its keys delete, for results that change"
+            raise StorageError(phrase("store_keeps_all", text, store=asked.store, why=why_not(error))) from error
+    return End()
+
+
 @contextmanager
-def _opened(asked: Upload | ConfirmUpload) -> Iterator[tuple[Any, str]]:
+def _opened(asked: Upload | ConfirmUpload | TryStore) -> Iterator[tuple[Any, str]]:
     """The store, and the path in it.
 
     Raises:
         StorageError: its package is missing, or whatever the store does not do in the block.
     """
     try:
-        import fsspec  # noqa: PLC0415 - few rigs need it
-
-        store, base = fsspec.core.url_to_fs(asked.store, use_listings_cache=False, **asked.options)
-        yield store, base.rstrip("/")
-    except (ImportError, OSError, ValueError) as error:
+        with object_store(asked.store, asked.options) as (store, base):
+            yield store, base.rstrip("/")
+    except OSError as error:
         text = "{store}: does not take copies ({why}); check address, keys and network, and the copy is made"
-        why = str(error).partition("\n")[0][:500] or type(error).__name__
-        raise StorageError(phrase("copying_no_store", text, store=asked.store, why=why)) from error
+        raise StorageError(phrase("copying_no_store", text, store=asked.store, why=why_not(error))) from error
 
 
 def _is_copied(source: Path, store: Any, base: str) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.settings.model import RigSettings
-from svev.doctor import disk, gpio, machine, named_files, network, trigger_box, webhook
+from svev.doctor import disk, gpio, machine, named_files, network, object_store, trigger_box, webhook
 from svev.doctor.cameras import exposure, firewire, gige
 from svev.doctor.finding import Finding, Topic, failure
 
@@ -50,6 +50,7 @@ def probes(rig: RigSettings, directory: Path, interrupted: bool | None = None) -
         Probe("huge pages", Topic.MEMORY, machine.look_at_huge_pages),
         Probe("disk", Topic.DISK, lambda: disk.look_at_disk(rig, directory), limit_s=30.0),
         Probe("other disks", Topic.DISK, lambda: disk.look_at_other_disks(rig, directory)),
+        Probe("object store", Topic.DISK, lambda: object_store.look_at_store(rig), limit_s=object_store.LOOK_S + 5),
         Probe("packet sockets", Topic.NETWORK, lambda: network.look_at_packet_sockets(rig)),
         Probe("socket buffers", Topic.NETWORK, lambda: network.look_at_socket_buffers(rig)),
         Probe("interfaces", Topic.NETWORK, lambda: network.look_at_interfaces(rig)),

@@ -1,5 +1,6 @@
 """An object store on loopback: a real S3 server (moto), reached through fsspec by programs of their own."""
 
+import json
 import os
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from tests.support.loopback import Loopback
 
 #: In a process of its own, as a workplace would use it: the libraries keep threads and connections.
 _PROGRAM: Final = """
-import sys, fsspec
+import json, sys, fsspec
 address, what, bucket, *more = sys.argv[1:]
 store = fsspec.filesystem("s3", endpoint_url=address)
 if what == "put":
@@ -19,6 +20,12 @@ if what == "put":
         store.mkdir(bucket.partition("/")[0])
     for path in more:
         store.put_file(path, bucket + "/" + path.rsplit("/", 1)[1])
+elif what == "keep-all":
+    store.call_s3("put_bucket_versioning", Bucket=bucket, VersioningConfiguration={"Status": "Enabled"})
+elif what == "versions":
+    answer = store.call_s3("list_object_versions", Bucket=bucket)
+    assert not answer["IsTruncated"]
+    print(json.dumps([[each["Key"], each["VersionId"]] for each in answer.get("Versions", ())]))
 else:
     store.get(bucket + "/", more[0], recursive=True)
 """
@@ -50,6 +57,20 @@ def take(address: str, place: str, folder: str) -> None:
     _run(address, "take", place, folder)
 
 
-def _run(address: str, *arguments: str) -> None:
+def keep_all(address: str, bucket: str) -> None:
+    """Let a bucket keep every version of an object from now on."""
+    _run(address, "keep-all", bucket)
+
+
+def versions(address: str, bucket: str) -> dict[str, tuple[str, ...]]:
+    """The versions of each object of a bucket that keeps them all."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name, version in json.loads(_run(address, "versions", bucket)):
+        found[name] = *found.get(name, ()), version
+    return found
+
+
+def _run(address: str, *arguments: str) -> str:
     command = [sys.executable, "-c", _PROGRAM, address, *arguments]
-    subprocess.run(command, env=os.environ | KEYS, timeout=60, check=True)
+    done = subprocess.run(command, env=os.environ | KEYS, timeout=60, check=True, stdout=subprocess.PIPE, text=True)
+    return done.stdout

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -19,9 +20,10 @@ from tests.capture.rigs import write_rig
 from tests.recorder.logs import ALL_OK, write_log
 from tests.recorder.split import split_log
 from tests.service.serving import Serving, serving
+from tests.support.cut_network import cut_network
 from tests.support.faulty_disk import FaultyDisk
 from tests.support.loopback import Loopback
-from tests.support.object_store import KEYS, object_store, put, take
+from tests.support.object_store import KEYS, keep_all, object_store, put, take, versions
 from tests.support.other_disk import other_disk
 from tests.support.waiting import wait_until
 
@@ -32,6 +34,8 @@ _PATIENCE_S: Final = 400.0
 #: A cut comes at any moment within so long after the first copy is at work.
 _WITHIN_S: Final = 0.6
 _LARGE: Final = 6
+#: Cuts of one service; the last one kills it.
+_AT_A_TIME: Final = 4
 
 
 def _recordings(folder: Path) -> dict[str, bytes]:
@@ -47,6 +51,13 @@ def _recordings(folder: Path) -> dict[str, bytes]:
     for number in range(_LARGE):  # a log that was never closed, with what no reader understands behind it
         (folder / f"large-{number}.mcap").write_bytes(head + np.random.default_rng(number).bytes(24_000_000))
     return {path.name: path.read_bytes() for path in folder.glob("*.mcap")}
+
+
+def _larger_than_a_piece(folder: Path) -> dict[str, bytes]:
+    """A log that goes into an object store in two pieces, by name."""
+    path = folder / "largest.mcap"
+    path.write_bytes((folder / "first.mcap").read_bytes() + np.random.default_rng(_LARGE).bytes(80_000_000))
+    return {path.name: path.read_bytes()}
 
 
 def _uploader(service: Serving) -> int | None:
@@ -167,28 +178,58 @@ def test_fifty_cuts_lose_nothing_and_copy_nothing_twice(tmp_path: Path, loopback
         assert {name: _confirmed(there)[name] for name in known} == known
 
 
-def test_an_object_store_is_copied_into_across_cuts(tmp_path: Path, loopback: Loopback) -> None:
-    """A real S3 server; what is there in the end is taken out by another program."""
-    logs, draw = _recordings(tmp_path / "data"), random.Random(51)
-    with object_store(loopback) as address:
+def test_fifty_cuts_of_a_store_lose_nothing_and_copy_nothing_twice(tmp_path: Path, loopback: Loopback) -> None:
+    """A real S3 server that keeps every version; the network is cut, or the service or its copying program killed."""
+    data, draw = tmp_path / "data", random.Random(51)
+    logs = _recordings(data)
+    logs |= _larger_than_a_piece(data)
+    with object_store(loopback) as address, cut_network(loopback.host, urlsplit(address).port or 0) as way:
         put(address, "hill")
-        offload = f'store = "s3://hill/jumps"\nstore_options = {{ endpoint_url = "{address}" }}\nkeep_free_GB = 1e6'
-        rig = _rig(tmp_path, loopback, offload)
-        begun = 0
-        for cut in range(_CUTS // 5):
-            with _cut_service(tmp_path, rig, loopback, KEYS) as service:
-                with suppress(AssertionError):
-                    wait_until(lambda: _uploader(service) is not None, "it copies", 5)
-                    begun += 1
-                time.sleep(draw.uniform(0, 3 * _WITHIN_S))
-                if cut % 2:
-                    _kill_uploader(service)
-            _whole(tmp_path / "data", logs)
-        assert begun > 2
-        with serving(tmp_path, rig, loopback, environment=KEYS) as service:
-            wait_until(
-                lambda: len([*(service.data / ".trash").glob("*.mcap")]) == len(logs), "all released", _PATIENCE_S
-            )
-        _whole(tmp_path / "data", logs)
-        take(address, "hill/jumps", str(tmp_path / "taken"))
-    _check_copies(tmp_path / "taken", logs)
+        keep_all(address, "hill")
+        cuts, known, round_number = 0, dict[str, tuple[str, ...]](), 0
+
+        def rig() -> Path:
+            return _rig(
+                tmp_path, loopback, f'store = "s3://hill/{round_number}"\nkeep_free_GB = 1e6\n'
+                f'store_options = {{ endpoint_url = "http://{loopback.host}:{way.port}" }}'
+            )  # fmt: skip
+
+        def check() -> None:
+            """Each log is here; what is copied is not copied again; what is released lies in the store."""
+            nonlocal known
+            _whole(data, logs)
+            now = versions(address, "hill")
+            confirmed = {name: each for name, each in now.items() if name.endswith(".mcap") and f"{name}.sha256" in now}
+            assert {name: confirmed.get(name) for name in known} == known
+            released = {f"{round_number}/{path.name}" for path in (data / ".trash").glob("*.mcap")}
+            assert released <= {*confirmed}
+            known = confirmed
+
+        def begin_again() -> None:
+            """All are released: once more, to another place in the store."""
+            nonlocal round_number
+            take(address, f"hill/{round_number}", str(tmp_path / f"taken-{round_number}"))
+            _check_copies(tmp_path / f"taken-{round_number}", logs)
+            for path in (data / ".trash").glob("*"):
+                path.rename(data / path.name)
+            (data / ".svev-offload.json").unlink()
+            round_number += 1
+
+        while cuts < _CUTS:
+            with _cut_service(tmp_path, rig(), loopback, KEYS) as service:
+                for cut in draw.choices((_kill_uploader, lambda _: way.cut()), k=_AT_A_TIME - 1):
+                    with suppress(AssertionError):  # there may be nothing left to do
+                        wait_until(lambda: _uploader(service) is not None, "it copies", 5)
+                        cuts += 1
+                    time.sleep(draw.uniform(0, 3 * _WITHIN_S))
+                    cut(service)
+                    time.sleep(draw.uniform(0, _WITHIN_S))
+                    way.heal()
+                cuts += _uploader(service) is not None
+            check()
+            if len([*(data / ".trash").glob("*.mcap")]) == len(logs):
+                begin_again()
+        with serving(tmp_path, rig(), loopback, environment=KEYS) as service:
+            _await_release(service, logs)
+        check()
+        begin_again()

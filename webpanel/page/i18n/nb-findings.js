@@ -36,6 +36,9 @@ export const findings = {
   check_other_disk: ["{gb} GB ledig i {folder} ({setting})"],
   check_other_disk_not_writable: ["det kan ikke skrives i {folder} ({setting}): {why}", "rett tilgangen; under systemd tillates det med: sudo systemctl edit svev, [Service] ReadWritePaths="],
   check_other_disk_same: ["{folder} ({setting}) er på samme disk som {first}", "velg en mappe på en annen disk, og sjekk at den er montert"],
+  check_store: ["{store} (offload.store) tar imot kopier og gir dem tilbake"],
+  check_store_refuses: ["{why}", "til da blir opptakene liggende her, og ingen frigis"],
+  check_store_silent: ["{store} (offload.store) svarte ikke innen {seconds} s", "sjekk adressen og nettverket; opptakene blir liggende her, og kopieres når det svarer"],
 
   check_gpio: ["linje {line} på {chip} er på plass ({setting})"],
   check_barrier: ["linje {line} på {chip} er klar for lysporten: Sjekk på siden viser nivået"],

@@ -100,6 +100,7 @@ export const refusals = {
   list_no_line: ["startlisten har ingen linje {line}: se på listen, noen kan ha fjernet den"],
   copying_no_folder: ["{folder}: mappen for kopier er ikke der; koble til disken, så blir kopien laget"],
   copying_no_store: ["{store}: tar ikke imot kopier ({why}); sjekk adresse, nøkler og nettverk, så blir kopien laget"],
+  store_keeps_all: ["{store}: tar imot kopier, men fjerner ingen ({why}); la nøklene slette, for resultater som endres"],
   copying_no_room: ["{folder}: har ikke de {gb} GB ledig som kopien tar; gjør plass, så blir kopien laget"],
   copying_other_log: ["{path}: er en annen logg med dette navnet; flytt den bort, så blir kopien laget"],
   measuring_result_damaged: ["{log}: {file} i resultatet kan ikke leses: mål den på nytt"],

@@ -102,11 +102,11 @@ def _whole(folder: Path, logs: dict[str, bytes]) -> None:
 
 def _await_release(service: Serving, logs: dict[str, bytes]) -> None:
     trash = service.data / ".trash"
-    wait_until(
-        lambda: {path.name for path in trash.glob("*.mcap")} == {*logs},
-        f"all are released: {service.log.read_text()}",
-        _PATIENCE_S,
-    )
+    try:
+        wait_until(lambda: {path.name for path in trash.glob("*.mcap")} == {*logs}, "all are released", _PATIENCE_S)
+    except AssertionError as error:
+        error.add_note(f"released: {[path.name for path in trash.glob('*.mcap')]}\n{service.log.read_text()}")
+        raise
 
 
 def _confirmed(there: Path) -> dict[str, tuple[int, int]]:
@@ -170,9 +170,7 @@ def test_fifty_cuts_lose_nothing_and_copy_nothing_twice(tmp_path: Path, loopback
             known = now
         assert begun > _CUTS // 2, "most cuts hit a copy"
         with serving(tmp_path, rig, loopback) as service:
-            wait_until(
-                lambda: len([*(service.data / ".trash").glob("*.mcap")]) == len(logs), "all released", _PATIENCE_S
-            )
+            _await_release(service, logs)
         _whole(tmp_path / "data", logs)
         _check_copies(there, logs)
         assert {name: _confirmed(there)[name] for name in known} == known

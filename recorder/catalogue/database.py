@@ -33,7 +33,7 @@ _IN_THE_WAY: Final = frozenset(
     {sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED, sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN}
 )
 #: Counts up when rows of the same log become different ones.
-_FORMAT: Final = 3
+_FORMAT: Final = 4
 _VERSION: Final = crc32(f"{version('svev')}.{_FORMAT}".encode()) & 0x7FFF_FFFF
 
 #: Main figures of a jump that are searched for, as `rig.api.jump.LastJump` names them.
@@ -42,7 +42,7 @@ _COLUMNS: Final = {
     "logs": ("path", "deleted", "growing", "keys", "plain", "entry"),
     "recordings": (
         "path", "id", "deleted", "time_ns", "duration_s", "level", "athlete", "bib", "bib_number", "favourite", "tags",
-        "continues", "part", "hill", "text", "session", "said",
+        "continues", "next_part", "part", "hill", "text", "session", "said",
     ),
     "joined": ("path", "entry"),
     "jumps": ("path", "jump", "time_ns", "live", "ok", *FIGURES, "content"),
@@ -54,8 +54,8 @@ CREATE TABLE logs (
 CREATE INDEX logs_growing ON logs (deleted) WHERE growing;
 CREATE TABLE recordings (
   path TEXT PRIMARY KEY, id TEXT, deleted INTEGER, time_ns INTEGER, duration_s REAL, level TEXT, athlete TEXT, bib TEXT,
-  bib_number INTEGER, favourite INTEGER, tags TEXT, continues TEXT, part INTEGER, hill TEXT, text TEXT, session TEXT,
-  said TEXT, checksum INTEGER);
+  bib_number INTEGER, favourite INTEGER, tags TEXT, continues TEXT, next_part TEXT, part INTEGER, hill TEXT,
+  text TEXT, session TEXT, said TEXT, checksum INTEGER);
 CREATE INDEX recordings_time ON recordings (deleted, time_ns, id);
 CREATE INDEX recordings_athlete ON recordings (athlete);
 CREATE INDEX recordings_continues ON recordings (continues) WHERE continues != '';

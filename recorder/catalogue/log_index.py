@@ -183,6 +183,8 @@ class LogIndex:
         self._connection = connection
         # Python's connections are freed late, with what the disk is to be told last.
         self._close = None if connection is None else weakref.finalize(self, connection.close)
+        if connection is not None:
+            connection.create_function("is_here", 1, partial(search.is_here, self._directory))
         for watch in self._watches.values():
             watch.forget()
 

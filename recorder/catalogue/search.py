@@ -1,14 +1,20 @@
 """Finds recordings and their measured jumps in the catalogue's file."""
 
+import os
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any, Final
 
+from recorder.catalogue.entry import SUFFIX
 from recorder.catalogue.search_words import Wanted, understood
+from recorder.catalogue.trash import trash_of
 from rig.api.athletes import JumpQuery, folded
 from rig.api.recordings import RecordingQuery, Sorting
+from rig.api.statement import Level
+from rig.host.file_names import is_recording_id
 
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND: Final = timedelta(microseconds=1)
@@ -20,6 +26,22 @@ _ORDERS: Final = {
     Sorting.ATHLETE: f"athlete = '', athlete, {_NEWEST}",
     Sorting.LONGEST: f"duration_s DESC, {_NEWEST}",
 }
+#: A recording of which a part is missing is no good one, whatever its logs say.
+_LEVEL: Final = f"""
+    CASE WHEN r.level != '{Level.ERROR}' AND NOT (is_here(r.continues) AND is_here(r.next_part))
+    THEN '{Level.WARNING}' ELSE r.level END = ?"""
+
+
+def is_here(directory: Path, part: str) -> bool:
+    """Whether a part of a recording lies in a folder or in its trash, as its verdict says; also if there is no part.
+
+    It is to be known by its name to the connection that is asked.
+    """
+    if not part:
+        return True
+    trash = trash_of(directory)
+    folders = (directory,) if trash.is_symlink() else (directory, trash)
+    return is_recording_id(part) and any(os.path.lexists(folder / f"{part}{SUFFIX}") for folder in folders)
 
 
 @dataclass(slots=True)
@@ -102,7 +124,7 @@ def _of_recordings(query: RecordingQuery) -> Conditions:
     if query.tag:
         conditions.add("instr(tags, ?)", _tag(query.tag))
     if query.verdict is not None:
-        conditions.add("level = ?", query.verdict.value)
+        conditions.add(_LEVEL, query.verdict.value)
     _add_span(conditions, "r", query.since, query.until)
     return conditions
 
@@ -121,7 +143,7 @@ def _add_wanted(conditions: Conditions, wanted: Wanted) -> None:
     for sign, seconds in wanted.durations:
         conditions.add(f"r.duration_s {sign} ?", seconds)
     for level in wanted.levels:
-        conditions.add("r.level = ?", level.value)
+        conditions.add(_LEVEL, level.value)
     for tag in wanted.tags:
         conditions.add("instr(r.tags, ?)", _tag(tag))
     if wanted.favourite is not None:

@@ -1,6 +1,7 @@
 """What the panel says of a recording in one line."""
 
 import errno
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -10,10 +11,12 @@ from recorder.catalogue.folder import Catalogue
 from recorder.log.extent import ENDED_EARLY, ENDED_EARLY_SAID, as_field, extent
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.writing.append_file import storage_error
+from rig.api.recordings import RecordingQuery
 from rig.api.statement import Level
 from rig.frame import FrameStatus
 from rig.phrase import Phrase, plain
 from service.recordings.describing import Chain, as_recording
+from service.recordings.measured_jumps import LogJudge
 from service.recordings.verdicts import verdict
 from tests.recorder.logs import ALL_OK, LOST, OK, SHAPE, make_tag, open_writer, write_log, write_pulse
 from tests.recorder.split import split_log
@@ -102,8 +105,28 @@ def test_a_recording_whose_first_or_last_part_is_gone_is_not_complete(
     folder.mkdir()
     write_log(log, (ALL_OK,) * 10)
     parts = split_log(log, folder / "r1.mcap", (4, 3))
+    part = parts[gone].read_bytes()
     parts[gone].unlink()
-    catalogue = Catalogue(folder)
-    (entry,) = catalogue.entries()
-    said = Chain(catalogue, [entry]).pointing_on(as_recording(entry)).verdict
-    assert (said.level, said.code, said.text) == (Level.WARNING, code, words)
+    with closing(Catalogue(folder, LogJudge())) as catalogue:
+        (entry,) = catalogue.entries()
+        said = Chain(catalogue, [entry]).pointing_on(as_recording(entry)).verdict
+        assert (said.level, said.code, said.text) == (Level.WARNING, code, words)
+        assert _found(catalogue) == {"verdict:warning": [entry.id], "verdict:good": []}
+        (folder / ".trash").mkdir()
+        (folder / ".trash" / parts[gone].name).write_bytes(part)
+        assert Chain(catalogue, [entry]).pointing_on(as_recording(entry)).verdict.level is Level.GOOD
+        assert _found(catalogue) == {"verdict:warning": [], "verdict:good": [entry.id]}
+
+
+def _found(catalogue: Catalogue) -> dict[str, list[str]]:
+    """What is found under two verdicts, as a text and as a condition of its own."""
+    found = {}
+    for level in (Level.WARNING, Level.GOOD):
+        text = f"verdict:{level}"
+        by_text, by_level = (
+            [entry.id for entry in catalogue.find(query).entries]
+            for query in (RecordingQuery(search=text), RecordingQuery(verdict=level))
+        )
+        assert by_text == by_level
+        found[text] = by_text
+    return found

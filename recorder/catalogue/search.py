@@ -27,18 +27,15 @@ _ORDERS: Final = {
     Sorting.LONGEST: f"duration_s DESC, {_NEWEST}",
 }
 #: A recording of which a part is missing is no good one, whatever its logs say.
-_LEVEL: Final = f"""
-    CASE WHEN r.level != '{Level.ERROR}' AND NOT (is_here(r.continues) AND is_here(r.next_part))
-    THEN '{Level.WARNING}' ELSE r.level END = ?"""
+_GONE: Final = " OR ".join(f"(r.{part} != '' AND NOT is_here(r.{part}))" for part in ("continues", "next_part"))
+_LEVEL: Final = f"CASE WHEN r.level != '{Level.ERROR}' AND ({_GONE}) THEN '{Level.WARNING}' ELSE r.level END = ?"
 
 
 def is_here(directory: Path, part: str) -> bool:
-    """Whether a part of a recording lies in a folder or in its trash, as its verdict says; also if there is no part.
+    """Whether a part of a recording lies in a folder or in its trash, as its verdict says.
 
     It is to be known by its name to the connection that is asked.
     """
-    if not part:
-        return True
     trash = trash_of(directory)
     folders = (directory,) if trash.is_symlink() else (directory, trash)
     return is_recording_id(part) and any(os.path.lexists(folder / f"{part}{SUFFIX}") for folder in folders)

@@ -35,6 +35,8 @@ _HANDLED = ("Failed to load resource", "net::ERR_")
 
 #: A microphone that beeps, and nobody who has to be asked for it.
 _MICROPHONE = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream")
+#: No process that waits in reserve for a page of the same context: each test has another context.
+_ONE_AT_A_TIME = ("--renderer-process-limit=1",)
 
 expect.set_options(timeout=PATIENCE_MS)
 
@@ -75,7 +77,7 @@ def shared_browser(run_token: str) -> Iterator[SharedBrowser]:
     path = shutil.which("chromium-headless-shell")
     if path is None:
         pytest.skip("no browser (Debian package chromium-headless-shell): the page cannot be tried")
-    arguments = [*_MICROPHONE, *(["--no-sandbox"] if os.geteuid() == 0 else [])]
+    arguments = [*_MICROPHONE, *_ONE_AT_A_TIME, *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with ExitStack() as stack:
         with shared_from_now_on(run_token):
             playwright = stack.enter_context(sync_playwright())

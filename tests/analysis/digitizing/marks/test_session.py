@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,7 +12,9 @@ from analysis.digitizing.marks.journal import SUFFIX, Entered, Journal, Key, ope
 from analysis.digitizing.marks.session import Session
 from rig.api.digitizing import Action, MarkState, PlaceAction, RemoveAction, StateAction, UndoAction
 from rig.errors import BadInputError
+from rig.transport.launcher import start_program
 
+_WRITER = "tests.analysis.digitizing.marks.writer"
 _HEAD = b'{"format": "svev-digitizing/1", "recording": "jump-1", "operator": "Anna"}\n'
 _places = st.tuples(st.floats(0, 640), st.floats(0, 480))
 _where = {"pulse": st.integers(1, 3), "camera": st.sampled_from(["K1", "K2"])}
@@ -143,34 +143,19 @@ def test_an_entry_that_was_cut_is_left_out_and_the_next_one_stands_in_its_place(
     session.close()
 
 
-_WRITER = """
-import sys
-from pathlib import Path
-from analysis.digitizing.marks.journal import SUFFIX, Journal
-from analysis.digitizing.marks.session import Session
-from rig.api.digitizing import PlaceAction
-session = Session(Journal(Path(sys.argv[1]) / f"Anna{SUFFIX}", "jump-1", "Anna"))
-for number in range(session.revision, 10 ** 9):
-    session.act(PlaceAction(do="place", pulse=number, camera="K1", thing="P1", xy=(number % 640, 1.0)))
-    print(number, flush=True)
-"""
-
-
 @pytest.mark.long
 def test_a_killed_program_loses_at_most_the_action_under_way(tmp_path: Path) -> None:
     last = -1
     for count in range(40):
-        process = subprocess.Popen(
-            [sys.executable, "-c", _WRITER, str(tmp_path)], stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": "."}
-        )
-        assert process.stdout is not None
-        for _ in range(3 + count % 7):
-            last = int(process.stdout.readline())
-        process.send_signal(signal.SIGKILL)
-        told = process.stdout.read().split()
-        process.stdout.close()
-        process.wait()
-        last = int(told[-1]) if told else last
+        reading, writing = os.pipe()
+        process = start_program(_WRITER, (str(tmp_path),), (), {}, own_group=False, output=(writing, 2))
+        os.close(writing)
+        with os.fdopen(reading) as told:
+            for _ in range(3 + count % 7):
+                last = int(told.readline())
+            process.send_signal(signal.SIGKILL)
+            last = int([str(last), *told.read().split()][-1])
+        process.wait(20)
         session = opened(tmp_path)
         kept = [key.pulse for key, _ in session.everything()]
         session.close()

@@ -113,7 +113,8 @@ def desk_by_survey(rendered: HillLog, service: MemoryService, panel: Panel) -> I
     """The rendered jump in the panel; when it is opened first, its cameras are oriented by the survey."""
     log = Path(shutil.copy(rendered.path, service.catalogue.directory / "jump.mcap"))
     service.survey = rendered.survey
-    with httpx.Client(base_url=f"{panel.url}/api/recordings/jump/digitizing", timeout=20) as client:
+    with panel.client() as client:
+        client.base_url = f"{panel.url}/api/recordings/jump/digitizing"
         yield Desk(f"{panel.url}/digitize.html?recording=jump", rendered, client, log)
 
 

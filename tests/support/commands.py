@@ -11,6 +11,12 @@ from rig.transport.launcher import Process, launcher, start_program
 from service.processes.backends import programs_of
 from svev.cli import _COMMANDS
 
+#: What commands import when they have begun, beside their own module.
+_IMPORTING = {
+    "calibrate": ("svev.commands.networks.calibrate_pictures",),
+    "ctl": ("httpx",),
+    "digitize": ("analysis.digitizing.desk",),
+}
 #: Commands that start programs.
 _LAUNCHING = ("record", "serve", "rehearse", "demo", "bench")
 #: What their processes run.
@@ -95,7 +101,7 @@ def launch_svev(
     """
     command = arguments[0] if arguments else ""
     if command in _COMMANDS:  # once: the next one has it from its birth, and so has the launcher of a service
-        programs = _OF_RIGS if command in _LAUNCHING else ()
+        programs = _OF_RIGS if command in _LAUNCHING else _IMPORTING.get(command, ())
         launcher().prepare(f"svev.commands.{_COMMANDS[command][0]}", *programs)
     return start_program(
         "svev.__main__",

@@ -18,14 +18,16 @@ noise is there, whatever made it (sensor, texture, compression).
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import log
+from math import log, pi, sqrt
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chndtr, erfc, i0e, i1e
 
 from rig.arrays import Flags, Floats, Integers
 
+Pixel = NDArray[np.floating]  #: a number for each pixel, 32 or 64 bits wide
 _UNKNOWNS = 10
 MARGIN: Final = 3.6  #: px beyond the disc that are fitted
 _WIDER, _MARGIN_OF_WIDER = 1.35, 2.2  # times the radius and px: of a large one that is approximate more is needed
@@ -127,9 +129,9 @@ def fit_discs(
     return discs
 
 
-def cover(r: Floats, radius: Floats, blur: Floats) -> tuple[Floats, Floats, Floats]:
+def cover(r: Pixel, radius: Pixel, blur: Pixel) -> tuple[Pixel, Pixel, Pixel]:
     """Blurred discs (n,) at distances r (n, k): value, derivative by r, derivative by the radius."""
-    value, by_r, by_radius = np.empty((3, *r.shape))
+    value, by_r, by_radius = np.empty((3, *r.shape), r.dtype)
     sharp = radius / blur > _SHARP
     for chosen, of in ((sharp, _cover_sharp), (~sharp, _cover_soft)):
         if chosen.any():
@@ -138,39 +140,40 @@ def cover(r: Floats, radius: Floats, blur: Floats) -> tuple[Floats, Floats, Floa
     return value, by_r, by_radius
 
 
-def _cover_sharp(r: Floats, radius: Floats, blur: Floats) -> tuple[Floats, Floats, Floats]:
+def _cover_sharp(r: Pixel, radius: Pixel, blur: Pixel) -> tuple[Pixel, Pixel, Pixel]:
     u = (r - radius + blur**2 / (2 * radius)) / blur
-    edge = np.exp(-0.5 * u**2) / (np.sqrt(2 * np.pi) * blur)
-    return np.asarray(0.5 * erfc(u / np.sqrt(2))), -edge, edge
+    edge = np.exp(-0.5 * u**2) / (sqrt(2 * pi) * blur)
+    return np.asarray(0.5 * erfc(u / sqrt(2))), -edge, edge
 
 
-def _cover_soft(r: Floats, radius: Floats, blur: Floats) -> tuple[Floats, Floats, Floats]:
+def _cover_soft(r: Pixel, radius: Pixel, blur: Pixel) -> tuple[Pixel, Pixel, Pixel]:
     a, b = r / blur, radius / blur
     common = (b / blur) * np.exp(-0.5 * (a - b) ** 2)
     return _share(a, b), np.asarray(-common * i1e(a * b)), np.asarray(common * i0e(a * b))
 
 
-def _share(a: Floats, b: Floats) -> Floats:
+def _share(a: Pixel, b: Pixel) -> Pixel:
     """The distribution function itself, which is slow: cubic between nodes that are dense enough for 1e-5.
 
     Args:
         a: (n, k) distances, in blurs.
         b: (n, 1) radii, in blurs.
     """
+    b = b.astype(float)
     first = np.maximum(0.0, np.floor((b - _TAIL) / _NODES))  # from there on it is not 1
     last = min(float(a.max()), float(b.max()) + _TAIL) / _NODES - float(first.min())
     count = min(int(last), int(2 * _TAIL / _NODES) + 1) + 2
     node = (first + np.arange(count)) * _NODES
     value = chndtr(b * b, 2.0, node * node)
     by_a = -b * np.exp(-0.5 * (node - b) ** 2) * i1e(node * b) * _NODES
-    place = np.clip(a / _NODES - first, 0.0, count - 1)
+    place = np.clip(a / _NODES - first.astype(a.dtype), 0.0, count - 1)
     left = np.minimum(place.astype(np.intp), count - 2)
-    t = place - left
+    t = place - left.astype(place.dtype)
     left += (np.arange(len(a)) * (count - 1))[:, None]
     # the cubic of each step as a polynomial: value, slope, and what makes it end as the next one begins
     rise, slope, next_slope = np.diff(value), by_a[:, :-1], by_a[:, 1:]
     terms = value[:, :-1], slope, 3 * rise - 2 * slope - next_slope, slope + next_slope - 2 * rise
-    constant, linear, square, cube = (np.take(term.ravel(), left) for term in terms)
+    constant, linear, square, cube = (np.take(term.astype(a.dtype).ravel(), left) for term in terms)
     return np.asarray(constant + t * (linear + t * (square + t * cube)))
 
 

@@ -3,6 +3,7 @@
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.arrays import Flags, Floats
 
@@ -12,7 +13,7 @@ BLUR: Final = 0.62  #: px, of lens and pixel, to begin with
 _GROUND_BLUR = 1.2  # px; standard deviation of the weights
 
 
-def ground_behind(grey: Floats, around: Flags) -> Floats:
+def ground_behind(grey: NDArray[np.floating], around: Flags) -> Floats:
     """Grey values (m, w, w) of the ground.
 
     Args:

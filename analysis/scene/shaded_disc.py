@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.scene.disc import MARGIN, Disc, cover
 from analysis.scene.ground import BLUR, CLEAR, REACH, ground_behind
@@ -26,26 +27,30 @@ _NEXT_TO_NOTHING = 1e-9  # weight of an unknown without prior: where an image is
 _STEPS = 10
 _FARTHEST, _LARGEST = 0.7, 0.25  # of a step: px; log R
 
+_Pixel = NDArray[np.float32]
+
 
 @dataclass(slots=True, eq=False)
 class _Discs:
-    """m discs whose windows are equally large.
+    """m discs whose windows are equally large. Unknowns are 64 bits wide, pixels 32: they are noisier than that.
 
     Attributes:
         index: (m,) of the places.
-        x, y: (m, p) of the pixels, px of the image.
+        middle: (m, 2) of the windows, px of the image.
+        x, y: (p,) of the pixels, px from there.
         grey, sigma: (m, p), sigma is infinite outside of the image.
-        xy: (m, 2) centres.
+        xy: (m, 2) centres, px from there.
         size: (m,) log R.
         stretch: (m, 2) as that of `analysis.scene.disc`.
         bright: (m, 3) their grey value at the centre, and what it gains to the right and down, per radius.
     """
 
     index: Integers
-    x: Floats
-    y: Floats
-    grey: Floats
-    sigma: Floats
+    middle: Integers
+    x: _Pixel
+    y: _Pixel
+    grey: _Pixel
+    sigma: _Pixel
     xy: Floats
     size: Floats
     stretch: Floats
@@ -66,10 +71,10 @@ class _Equations:
 
     normal: Floats
     right: Floats
-    v: Floats
-    ground: Floats
-    contrast: Floats
-    weight: Floats
+    v: _Pixel
+    ground: _Pixel
+    contrast: _Pixel
+    weight: _Pixel
 
 
 def fit_shaded_discs(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> list[Disc | None]:
@@ -98,22 +103,19 @@ def _groups(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> Iterator
         index = np.flatnonzero(half == own)
         steps = np.arange(-own, own + 1)
         centre = np.rint(xy[index]).astype(int)
-        x = np.broadcast_to((centre[:, :1] + steps)[:, None], (len(index), len(steps), len(steps)))
-        y = np.broadcast_to((centre[:, 1:] + steps)[:, :, None], x.shape)
-        inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
-        at = np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)
-        flat = (len(index), -1)
-        window = grey[at].reshape(flat)
-        noise = np.where(inside, sigma[at], np.inf).reshape(flat)
-        size, places = np.log(radius[index]), xy[index].astype(float)
+        y, x = (part.ravel() for part in np.meshgrid(steps, steps, indexing="ij"))
+        column, row = centre[:, :1] + x, centre[:, 1:] + y
+        inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        at = np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)
         yield _Discs(
             index,
-            x.reshape(flat).astype(float),
-            y.reshape(flat).astype(float),
-            window,
-            noise,
-            places,
-            size,
+            centre,
+            x.astype(np.float32),
+            y.astype(np.float32),
+            grey[at].astype(np.float32),
+            np.where(inside, sigma[at], np.inf).astype(np.float32),
+            xy[index] - centre,
+            np.log(radius[index]),
             np.zeros((len(index), 2)),
             np.zeros((len(index), 3)),
         )
@@ -149,24 +151,24 @@ def _judged(discs: _Discs, start: Floats, moved: Floats) -> list[Disc | None]:
     stretch = 2 * np.arctanh(np.minimum(0.99, np.hypot(*discs.stretch.T)))
     shapes = zip(radius.tolist(), stretch.tolist(), last.contrast.tolist(), rms.tolist(), factor.tolist(), strict=True)
     return [
-        Disc(discs.xy[i].copy(), covariance[i], size, BLUR, longer, above, off, ratio) if good[i] else None
+        Disc(discs.middle[i] + discs.xy[i], covariance[i], size, BLUR, longer, above, off, ratio) if good[i] else None
         for i, (size, longer, above, off, ratio) in enumerate(shapes)
     ]
 
 
-def _model(discs: _Discs) -> tuple[Floats, Floats, tuple[Floats, ...], Flags]:
+def _model(discs: _Discs) -> tuple[_Pixel, _Pixel, tuple[_Pixel, ...], Flags]:
     """The ground (m, p), the discs (m, p), their derivatives by x, y, log R and stretch, and the fitted pixels."""
-    dx, dy = discs.x - discs.xy[:, :1], discs.y - discs.xy[:, 1:]
-    p, q = discs.stretch[:, :1], discs.stretch[:, 1:]
+    dx, dy = (of - at.astype(np.float32)[:, None] for of, at in zip((discs.x, discs.y), discs.xy.T, strict=True))
+    p, q = discs.stretch.astype(np.float32).T[..., None]
     u, w = (1 + p) * dx + q * dy, q * dx + (1 - p) * dy
-    r, radius = np.hypot(u, w) + 1e-9, np.exp(discs.size)
+    r, radius = np.sqrt(u * u + w * w) + np.float32(1e-9), np.exp(discs.size).astype(np.float32)
     beyond = r - radius[:, None]
     inside = np.isfinite(discs.sigma)
     around = inside & (beyond > CLEAR) & (beyond < MARGIN)
-    side = int(np.sqrt(discs.x.shape[1]))
+    side = int(np.sqrt(len(discs.x)))
     square = (len(r), side, side)
-    ground = ground_behind(discs.grey.reshape(square), around.reshape(square)).reshape(r.shape)
-    disc, by_r, by_radius = cover(r, radius, np.full(len(radius), BLUR))
+    ground = ground_behind(discs.grey.reshape(square), around.reshape(square)).reshape(r.shape).astype(np.float32)
+    disc, by_r, by_radius = cover(r, radius, np.full(len(radius), BLUR, np.float32))
     along_u, along_w = by_r / r * u, by_r / r * w
     derivatives = (
         -(along_u * (1 + p) + along_w * q),
@@ -178,17 +180,20 @@ def _model(discs: _Discs) -> tuple[Floats, Floats, tuple[Floats, ...], Flags]:
     return ground, disc, derivatives, inside & (beyond < REACH)
 
 
-def _of_disc(values: Floats, disc: Floats) -> Floats:
+def _of_disc(values: _Pixel, disc: _Pixel) -> _Pixel:
     """Means (m,) of values (m, p) under the discs."""
-    return np.asarray((values * disc).sum(axis=1) / np.maximum(disc.sum(axis=1), 1e-9))
+    return np.asarray((values * disc).sum(axis=1) / np.maximum(disc.sum(axis=1), np.float32(1e-9)))
 
 
 def _equations(discs: _Discs, start: Floats) -> _Equations:
     ground, disc, derivatives, used = _model(discs)
     radius = np.exp(discs.size)[:, None]
-    right, down = (discs.x - discs.xy[:, :1]) / radius, (discs.y - discs.xy[:, 1:]) / radius
-    above = discs.bright[:, :1] + discs.bright[:, 1:2] * right + discs.bright[:, 2:] * down - ground
-    contrast = discs.bright[:, 0] - _of_disc(ground, disc)
+    right, down = (
+        ((of - at[:, None]) / radius).astype(np.float32) for of, at in zip((discs.x, discs.y), discs.xy.T, strict=True)
+    )
+    level, to_right, to_down = discs.bright.astype(np.float32).T[..., None]
+    above = level + to_right * right + to_down * down - ground
+    contrast = level[:, 0] - _of_disc(ground, disc)
     v = discs.grey - ground - above * disc
     weight = used / (discs.sigma**2 + (_MODEL * contrast[:, None]) ** 2)
     design = np.stack((*(above * part for part in derivatives), disc, disc * right, disc * down), axis=1)

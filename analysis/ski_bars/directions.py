@@ -22,7 +22,7 @@ import numpy as np
 
 from analysis.ski_bars.bars import SKIS, USUAL_SHAPE
 from analysis.ski_bars.model import BOOT_M, SHOVEL_M
-from analysis.ski_bars.pixels import SkiView, to_piece
+from analysis.ski_bars.pixels import Pixel, SkiView, to_piece
 from rig.arrays import Flags, Floats, Integers
 
 #: Slope and heading of a ski against the flight, rad, standard deviations, and how far from it they are sought: no ski
@@ -319,21 +319,22 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
     r = np.arange(_REACH_M[0], _REACH_M[1], _ALONG_M)
     on, shape = slice(beside, beside + 2 * side + 1), (len(turns), len(u), len(r))
     cosine, sine = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]
+    # Pixels are 32 bits wide: they are noisier than that.
     x = (xy[0] - region.x + cosine * (r * scale) - sine * u[:, None]).reshape(len(turns), -1).astype(np.float32)
     y = (xy[1] - region.y + sine * (r * scale) + cosine * u[:, None]).reshape(len(turns), -1).astype(np.float32)
     grey, behind, sigma = (
-        np.asarray(cv2.remap(layer, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), float).reshape(shape)
+        np.asarray(cv2.remap(layer, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
         for layer in (region.grey, region.behind, region.sigma)
     )
+    grey, behind, variance = grey.reshape(shape), behind.reshape(shape), (sigma * sigma).reshape(shape)
     inside = (x >= 0) & (x <= region.grey.shape[1] - 1) & (y >= 0) & (y <= region.grey.shape[0] - 1)
     inside = inside.reshape(shape)
     if len(view.legs.ends) or taken is not None:
-        places = np.stack((x + region.x, y + region.y), axis=-1).astype(float).reshape(*shape, 2)
-        inside &= ~view.on_legs(places)
+        places = (x + np.float32(region.x)).reshape(shape), (y + np.float32(region.y)).reshape(shape)
+        inside &= ~view.on_legs(*places)
         if taken is not None:
             ends = taken[0] + np.array(USUAL_SHAPE[1:])[:, None] * taken[1] + view.shift
-            inside &= to_piece(places, view.camera.project(ends)) > _TAKEN_M * scale + _TAKEN_PX
-    variance = sigma**2
+            inside &= to_piece(*places, view.camera.project(ends)) > _TAKEN_M * scale + _TAKEN_PX
     scene = _density(grey - behind, variance)
     nothing = np.log(0.5 * scene + 0.5 * _ANYTHING)
     free = np.where(inside, np.log(_FREE * scene + (1 - _FREE) * _ANYTHING) - nothing, 0.0)
@@ -346,7 +347,7 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
     return np.concatenate((np.zeros((*gain.shape[:2], 1)), alike * np.cumsum(gain, axis=-1)), axis=-1), aside
 
 
-def _as_ski(grey: Floats, behind: Floats, variance: Floats, scene: Floats, arms: Flags, r: Floats) -> Floats:
+def _as_ski(grey: Pixel, behind: Pixel, variance: Pixel, scene: Pixel, arms: Flags, r: Floats) -> Pixel:
     """Densities of pixels (..., n) of lines that a ski lies on, logarithms.
 
     How bright the ski is tells its whole length or its half near the binding, whichever fits better: a ski that leads
@@ -361,7 +362,7 @@ def _as_ski(grey: Floats, behind: Floats, variance: Floats, scene: Floats, arms:
         r: (n,) m along the lines.
     """
 
-    def with_brightness_of(part: Flags) -> Floats:
+    def with_brightness_of(part: Flags) -> Pixel:
         bright = np.median(grey[..., part], axis=-1, keepdims=True)
         misfit = variance + (_MODEL * (bright - behind)) ** 2 + _ROUGH**2
         return np.asarray(np.log(_ON_SKI * _density(grey - bright, misfit) + _THROUGH * scene + _COVERED * _ANYTHING))
@@ -371,5 +372,5 @@ def _as_ski(grey: Floats, behind: Floats, variance: Floats, scene: Floats, arms:
     return np.where(better, near, whole)
 
 
-def _density(off: Floats, variance: Floats) -> Floats:
+def _density(off: Pixel, variance: Pixel) -> Pixel:
     return np.asarray(np.exp(-off * off / (2 * variance)) / np.sqrt(2 * np.pi * variance))

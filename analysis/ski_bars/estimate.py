@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.ski_bars.bars import SKIS, ExpectedBars
 from analysis.ski_bars.model import POSE, SHAPE, SHOVEL_M, BarModel, Predicted, hidden_by_boots
-from analysis.ski_bars.pixels import CELL_PX, Pixels
+from analysis.ski_bars.pixels import CELL_PX, Pixel, Pixels
 from rig.arrays import Flags, Floats
 
 _ALONG_PX, _ACROSS_PX = 10.0, 1.5  # over which errors of the model are alike
@@ -38,6 +37,7 @@ _BLUR_PX, _BLUR_LOG = 0.65, 0.25
 _HALF_M, _HALF_LOG = 0.035, 0.4  # half the width that a ski shows, and its spread
 _GREY_SIGMA = 100.0
 _COVERED = 0.05  # of a pixel by a ski
+_ON_AXIS_PX = 0.5  # rows of cells are 1 px apart
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +72,7 @@ class BarFit:
     def __init__(self, model: BarModel, pixels: Pixels, expected: ExpectedBars) -> None:
         self.model, self.pixels = model, pixels
         self.used = np.tile(np.array(model.present), (len(model.views), 1))
+        self._hidden: tuple[Floats, Flags] | None = None  # by boots, at the latest poses
         at = model.unknowns
         self.mean, sigma = np.zeros(at.size), np.empty(at.size)
         self.mean[SHAPE], sigma[SHAPE] = expected.shape.ravel(), expected.shape_sigma.ravel()
@@ -91,7 +92,7 @@ class BarFit:
         for c in range(len(self.model.views)):
             here = self.pixels.camera == c
             for k in range(SKIS):
-                core = here & (np.abs(seen.u[k]) < 1.0) & (seen.cover[k] > 0.5)
+                core = here & (np.abs(seen.u[k]) < _ON_AXIS_PX) & (seen.cover[k] > 0.5)
                 if core.any():
                     x[at.brightness[c, k]] = np.median(self.pixels.grey[core])
         return x
@@ -147,35 +148,43 @@ class BarFit:
         square = (self.pixels.grey - seen.grey) ** 2 / (self.pixels.noise + model)
         share = (self.pixels.noise + model) / (self.pixels.noise + _TOGETHER * model)
         loss = share * square * _SIGMAS**2 / (square + _SIGMAS**2)
-        return float(loss[self.fitted(x, seen) if fitted is None else fitted].sum() + off @ self.prior @ off) / 2
+        return (
+            float(loss[self.fitted(x, seen) if fitted is None else fitted].sum(dtype=float) + off @ self.prior @ off)
+            / 2
+        )
 
-    def _contrast(self, x: Floats) -> Floats:
+    def _contrast(self, x: Floats) -> Pixel:
         """(n,) of the ski that differs more from the static scene there."""
-        bright = x[self.model.unknowns.brightness].T[:, self.pixels.camera]
-        off = np.where(np.array(self.model.present)[:, None], np.abs(bright - self.pixels.behind), 0.0)
-        return np.asarray(np.maximum(off[0], off[1]))
+        bright = x[self.model.unknowns.brightness].T.astype(np.float32)
+        off = [
+            np.abs(bright[k].take(self.pixels.camera) - self.pixels.behind) for k in np.flatnonzero(self.model.present)
+        ]
+        return np.asarray(off[0] if len(off) == 1 else np.maximum(*off))
 
-    def _model_variance(self, x: Floats, seen: Predicted, m: float) -> Floats:
-        shovel = (seen.s > SHOVEL_M) & np.isfinite(seen.s)
-        return np.asarray((np.where(shovel[0] | shovel[1], np.hypot(m, _SHOVEL), m) * self._contrast(x)) ** 2)
+    def _model_variance(self, x: Floats, seen: Predicted, m: float) -> Pixel:
+        shovel = ((seen.s > SHOVEL_M) & np.isfinite(seen.s)).any(axis=0)
+        error = np.where(shovel, np.float32(np.hypot(m, _SHOVEL)), np.float32(m)) * self._contrast(x)
+        return np.asarray(error * error)
 
-    def robust(self, x: Floats, seen: Predicted, m: float) -> Floats:
+    def robust(self, x: Floats, seen: Predicted, m: float) -> Pixel:
         """(n,) weights of the pixels: 1 where the model holds, else towards 0."""
         return self._robust(seen, self._model_variance(x, seen, m))
 
-    def _robust(self, seen: Predicted, model: Floats) -> Floats:
+    def _robust(self, seen: Predicted, model: Pixel) -> Pixel:
         square = (self.pixels.grey - seen.grey) ** 2 / (self.pixels.noise + model)
         return np.asarray((_SIGMAS**2 / (square + _SIGMAS**2)) ** 2)
 
-    def weights(self, x: Floats, seen: Predicted, fitted: Flags, m: float) -> Floats:
+    def weights(self, x: Floats, seen: Predicted, fitted: Flags, m: float) -> Pixel:
         """(n,) weights in the normal equations: errors that neighbours share count once."""
         model = self._model_variance(x, seen, m)
-        return np.where(fitted, self._robust(seen, model) / (self.pixels.noise + _TOGETHER * model), 0.0)
+        return np.asarray(fitted * self._robust(seen, model) / (self.pixels.noise + _TOGETHER * model))
 
     def fitted(self, x: Floats, seen: Predicted) -> Flags:
         """(n,) which pixels count: those of used images that no boot may hide."""
+        if self._hidden is None or (self._hidden[0] != x[POSE]).any():
+            self._hidden = x[POSE].copy(), hidden_by_boots(self.model, x, self.pixels)
         nearest = np.abs(seen.u).argmin(axis=0)
-        return np.asarray(self.used[self.pixels.camera, nearest] & ~hidden_by_boots(self.model, x, self.pixels))
+        return np.asarray(self.used[self.pixels.camera, nearest] & ~self._hidden[1])
 
     def _model_error(self, x: Floats, seen: Predicted) -> float:
         near = ((np.abs(seen.u) < seen.half + _BESIDE_PX) & (seen.s < SHOVEL_M)).any(axis=0) & self.fitted(x, seen)
@@ -196,7 +205,7 @@ class BarFit:
         return np.asarray(inverse @ (by_noise + by_model + self.prior) @ inverse)
 
     def sandwich(
-        self, x: Floats, seen: Predicted, rows: Floats, fitted: Flags, m: float
+        self, x: Floats, seen: Predicted, rows: Pixel, fitted: Flags, m: float
     ) -> tuple[Floats, Floats, Floats]:
         """Normal equations of the pixels, and the covariances of their right side by noise and by errors of the model.
 
@@ -208,6 +217,7 @@ class BarFit:
             m: error of the model in proportion to the contrast.
         """
         weight = self.weights(x, seen, fitted, m)
+        rows = rows.astype(float)  # what is inverted loses digits
         weighted = weight * rows
         by_noise, by_model = (weighted * self.pixels.noise) @ weighted.T, np.zeros((len(rows),) * 2)
         error = (_TAILS * np.sqrt(self._model_variance(x, seen, m)) * weighted).astype(np.float32)
@@ -220,6 +230,5 @@ class BarFit:
         return np.asarray(rows @ weighted.T), np.asarray(by_noise), by_model
 
 
-def _apart(place: Floats) -> NDArray[np.float32]:
-    values = place.astype(np.float32)
-    return np.asarray(np.abs(values[:, None] - values))
+def _apart(place: Pixel) -> Pixel:
+    return np.asarray(np.abs(place[:, None] - place))

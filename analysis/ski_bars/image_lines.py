@@ -61,13 +61,13 @@ def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
     poses = model.poses(x)
     lines: list[list[ImageLine | None]] = []
     for c, view in enumerate(model.views):
-        rows = np.zeros((SKIS * REDUNDANCY, len(off)))
+        rows = np.zeros((SKIS * REDUNDANCY, len(off)), np.float32)
         here = fitted & (fit.pixels.camera == c)
         for k in range(SKIS):
             t = np.where(np.isfinite(seen.t[k]), seen.t[k], 0.0)
             rows[REDUNDANCY * k : REDUNDANCY * (k + 1)] = -seen.by_u[k], -seen.by_u[k] * t, -seen.by_t[k]
         of_image = np.concatenate(([at.blur[c]], at.width[c], at.brightness[c]))
-        rows = np.where(here, np.concatenate((rows, seen.by_unknowns[of_image])), 0.0)
+        rows = np.where(here, np.concatenate((rows, seen.by_unknowns[of_image])), np.float32(0))
         prior = np.zeros((len(rows),) * 2)
         own = np.tile((_WIDE_PX, _WIDE_RAD, _WIDE_PX), SKIS) ** -2.0
         prior[: len(own), : len(own)] = np.diag(own)

@@ -9,6 +9,8 @@ distribution F. Of two skis the nearer one hides the farther one, and both hide 
 
     I = S (1 - D_far) (1 - D_near) + B_far D_far (1 - D_near) + B_near D_near.
 
+Unknowns and places along the axes are 64 bits wide, what is said of pixels 32: they are noisier than that.
+
 How wide a flat box of 102 x 18 mm appears depends on how it is edged, which nobody knows: so each ski has a width of
 its own in each image. The brightness B is another one in each image too: the faces are lit differently.
 """
@@ -21,7 +23,7 @@ import numpy as np
 
 from analysis.scene.camera_system import PlacedCamera
 from analysis.ski_bars.bars import OF_POSE, OF_SHAPE, SKIS, Poses, axis_points
-from analysis.ski_bars.pixels import Pixels, SkiView
+from analysis.ski_bars.pixels import Pixel, Pixels, SkiView
 from rig.arrays import Flags, Floats, Integers
 
 POSE: Final = slice(0, SKIS * OF_POSE)
@@ -37,7 +39,7 @@ _FROM_NODES: Final = np.linalg.pinv(np.vander(_NODES, _POWERS).T)
 _SLOPES: Final = (_FROM_NODES[:, :-1] @ (np.arange(_POWERS - 1, 0, -1) * np.vander(_NODES, _POWERS - 1)).T).T
 _PLACES: Final = 6  # of a node without derivatives
 _WHITE: Final = 255.0
-_ROOT_TAU: Final = np.sqrt(2 * np.pi)
+_ROOT_TAU: Final = float(np.sqrt(2 * np.pi))
 _FARTHEST: Final = 8.0  # standard deviations, beyond which the normal distribution is 0 or 1
 
 
@@ -86,15 +88,15 @@ class Predicted:
         half: (2, n) px.
     """
 
-    grey: Floats
-    by_unknowns: Floats
-    u: Floats
-    t: Floats
-    s: Floats
-    cover: Floats
-    by_u: Floats
-    by_t: Floats
-    half: Floats
+    grey: Pixel
+    by_unknowns: Pixel
+    u: Pixel
+    t: Pixel
+    s: Pixel
+    cover: Pixel
+    by_u: Pixel
+    by_t: Pixel
+    half: Pixel
 
 
 class BarModel:
@@ -111,7 +113,11 @@ class BarModel:
         self._across = start.axes()
         places, _ = axis_points(start, np.zeros(SKIS), _NODES, self._across)
         # A ski moves by centimetres in a fit, and the derivatives of its image by parts in a thousand.
-        self._by_place = [_derivatives(view.camera, places + view.shift) for view in views]
+        self._by_place = np.array([_derivatives(view.camera, places + view.shift) for view in views])
+        self._shift = np.array([view.shift for view in views])[:, None, None]
+        self._position = np.array([view.camera.position for view in views])[:, None, None]
+        self._c = np.array([view.camera.camera.interior[0] for view in views])[:, None, None]
+        self._latest: tuple[Pixels, Floats, bool, _Feet] | None = None
 
     @property
     def unknowns(self) -> Unknowns:
@@ -130,12 +136,13 @@ class BarModel:
             x: unknowns.
             derivatives: whether they are wanted; they are zero otherwise.
         """
-        at, poses = self.unknowns, self.poses(x)
-        shape = x[SHAPE].reshape(SKIS, OF_SHAPE)
-        feet = self._feet(pixels, poses, shape[:, 0], derivatives=derivatives)
+        at = self.unknowns
+        x32 = x.astype(np.float32)
+        shape = x32[SHAPE].reshape(SKIS, OF_SHAPE)
+        feet = self._feet_at(pixels, x, derivatives=derivatives)
         c = pixels.camera
-        blur = np.exp(x[at.blur])[c]
-        half = np.exp(x[at.width]).T[:, c] * feet.scale
+        blur = np.exp(x32[at.blur])[c]
+        half = np.exp(x32[at.width]).T[:, c] * feet.scale
         tail, tip = ((feet.s - shape[:, end, None]) * feet.px_per_m for end in (1, 2))
         edges = np.stack((feet.u + half, feet.u - half, tail, tip)) / blur
         (p_left, p_right, p_tail, p_tip), (left, right, behind_tail, behind_tip) = _normal(edges)
@@ -143,11 +150,12 @@ class BarModel:
         cover = across * along
         absent = [k for k in range(SKIS) if not self.present[k]]
         cover[absent] = 0.0
-        hides = np.stack(((feet.nearer == 0)[c], (feet.nearer == 1)[c])).astype(float)  # the other ski
+        hides = np.stack(((feet.nearer == 0)[c], (feet.nearer == 1)[c])).astype(np.float32)  # the other ski
         shown, through = 1 - hides[::-1] * cover[::-1], pixels.behind * (1 - cover[::-1])
-        bright = x[at.brightness].T[:, c]
+        bright = x32[at.brightness].T[:, c]
         grey = through[0] * (1 - cover[0]) + (bright * cover * shown).sum(axis=0)
-        rate, by_u, by_t = np.zeros((at.size, len(c))), np.zeros_like(cover), np.zeros_like(cover)
+        rate = np.zeros((at.size, len(c)), np.float32)
+        by_u, by_t = np.zeros_like(cover), np.zeros_like(cover)
         if derivatives:
             by_cover = bright * shown - through - hides * (bright * cover)[::-1]
             by_cover[absent] = 0.0
@@ -167,43 +175,60 @@ class BarModel:
                 rate[at.blur[camera], here] = by_blur[here]
                 rate[at.width[camera], here] = by_width[:, here]
                 rate[at.brightness[camera], here] = by_bright[:, here]
-        for of in (feet.u, feet.t, feet.s):
+        u, t, s = (of.copy() if absent else of for of in (feet.u, feet.t, feet.s))
+        for of in (u, t, s):
             of[absent] = np.inf
         half[absent] = 0.0
-        return Predicted(np.minimum(grey, _WHITE), rate, feet.u, feet.t, feet.s, cover, by_u, by_t, half)
+        return Predicted(np.minimum(grey, _WHITE), rate, u, t, s, cover, by_u, by_t, half)
+
+    def _feet_at(self, pixels: Pixels, x: Floats, *, derivatives: bool) -> "_Feet":
+        """The feet at unknowns; those of the latest call where neither poses nor bends have changed."""
+        bend = x[SHAPE][::OF_SHAPE]
+        axes = np.concatenate((x[POSE], bend))
+        if self._latest is not None:
+            of, at, complete, feet = self._latest
+            if of is pixels and (complete or not derivatives) and (at == axes).all():
+                return feet
+        feet = self._feet(pixels, self.poses(x), bend, derivatives=derivatives)
+        self._latest = pixels, axes, derivatives, feet
+        return feet
 
     def _feet(self, pixels: Pixels, poses: Poses, bend: Floats, *, derivatives: bool) -> "_Feet":
         """The feet of pixels on both axes."""
         places, by = axis_points(poses, bend, _NODES, self._across)
         n, m = len(pixels.camera), len(self.views)
         rows = _PLACES + (2 * (OF_POSE + 1) if derivatives else 0)
-        at, s, t = np.empty((SKIS, rows, n)), np.empty((SKIS, n)), np.empty((SKIS, n))
-        nearer = np.empty(m, np.intp)
-        for c, (view, here) in enumerate(zip(self.views, pixels.of_cameras(m), strict=True)):
-            there = places + view.shift
-            xy = view.camera.project(there)
-            distance = np.linalg.norm(there - view.camera.position, axis=-1)
-            nearer[c] = int(distance.mean(axis=1).argmin())
-            slope = _SLOPES @ xy
-            px_per_m = np.hypot(slope[..., 0], slope[..., 1])[..., None]
-            tangent = slope / px_per_m
-            table = [xy, tangent, (view.camera.camera.interior[0] / distance)[..., None], px_per_m]
-            if derivatives:
-                frame = np.stack((np.stack((-tangent[..., 1], tangent[..., 0]), axis=-1), tangent), axis=-2)
-                table.append((frame @ (self._by_place[c] @ by)).reshape(*frame.shape[:2], -1))
-            polynomials = np.concatenate(table, axis=-1).swapaxes(1, 2) @ _FROM_NODES
+        at, off = np.empty((SKIS, rows, n), np.float32), np.empty((SKIS, 2, n), np.float32)
+        s, t = np.empty((2, SKIS, n), np.float32)
+        there = places + self._shift
+        xy = np.array([view.camera.project(of) for view, of in zip(self.views, there, strict=True)])
+        distance = np.sqrt(((there - self._position) ** 2).sum(axis=-1))
+        table = np.empty((m, SKIS, len(_NODES), rows))
+        slope = _SLOPES @ xy
+        table[..., :2], table[..., 5] = xy, np.hypot(slope[..., 0], slope[..., 1])
+        table[..., 2:4] = slope / table[..., 5:6]
+        table[..., 4] = self._c / distance
+        middle = _PLACES + OF_POSE + 1
+        if derivatives:
+            right, down = np.moveaxis(self._by_place @ by, -2, 0)
+            table[..., _PLACES:middle] = table[..., 2:3] * down - table[..., 3:4] * right
+            table[..., middle:] = table[..., 2:3] * right + table[..., 3:4] * down
+        polynomials = table.swapaxes(2, 3) @ _FROM_NODES
+        narrow = polynomials.astype(np.float32)
+        chord = xy[:, :, -1] - xy[:, :, 0]
+        chord /= np.hypot(chord[..., 0], chord[..., 1])[..., None]
+        nodes = (xy @ chord[..., None])[..., 0]
+        for c, here in enumerate(pixels.of_cameras(m)):
             for k in range(SKIS):
-                chord = xy[k, -1] - xy[k, 0]
-                chord /= np.hypot(*chord)
-                way = pixels.xy[here] @ chord
-                nodes = xy[k] @ chord
-                s[k, here] = np.interp(way, nodes, _NODES)
-                t[k, here] = way - np.interp(0.0, _NODES, nodes)
-                at[k, :, here] = polynomials[k] @ _powers(s[k, here])
-        off = pixels.xy.T - at[:, :2]
+                way = pixels.xy[here] @ chord[c, k]
+                s[k, here] = along = np.interp(way, nodes[c, k], _NODES)
+                t[k, here] = way - np.interp(0.0, _NODES, nodes[c, k])
+                powers = _powers(along)
+                off[k, :, here] = pixels.xy[here].T - polynomials[c, k, :2] @ powers
+                at[k, 2:, here] = narrow[c, k, 2:] @ powers.astype(np.float32)
         u = at[:, 2] * off[:, 1] - at[:, 3] * off[:, 0]
         s += (at[:, 2] * off[:, 0] + at[:, 3] * off[:, 1]) / at[:, 5]
-        middle = _PLACES + OF_POSE + 1
+        nearer = distance.mean(axis=-1).argmin(axis=-1)
         return _Feet(u, t, s, at[:, 4], at[:, 5], at[:, _PLACES:middle], at[:, middle:], nearer)
 
 
@@ -218,13 +243,13 @@ class _Feet:
         nearer: by camera the ski that is nearer to it.
     """
 
-    u: Floats
-    t: Floats
-    s: Floats
-    scale: Floats
-    px_per_m: Floats
-    across: Floats
-    along: Floats
+    u: Pixel
+    t: Pixel
+    s: Pixel
+    scale: Pixel
+    px_per_m: Pixel
+    across: Pixel
+    along: Pixel
     nearer: Integers
 
 
@@ -242,7 +267,7 @@ def _derivatives(camera: PlacedCamera, places: Floats) -> Floats:
     return camera.linearised(places.reshape(-1, 3), px.reshape(-1, 2))[1].reshape(*places.shape[:-1], 2, 3)
 
 
-def _normal(value: Floats) -> tuple[Floats, Floats]:
+def _normal(value: Pixel) -> tuple[Pixel, Pixel]:
     """Density and distribution function of the normal distribution, the latter within 1e-7.
 
     Abramowitz and Stegun, Handbook of Mathematical Functions, 26.2.17: faster than that of SciPy by far.

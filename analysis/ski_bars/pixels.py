@@ -7,12 +7,14 @@ from typing import Final
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.candidates.foreground.background import Region
 from analysis.scene.camera_system import PlacedCamera
 from analysis.ski_bars.bars import SKIS, Poses
 from rig.arrays import Flags, Floats, Integers
 
+Pixel = NDArray[np.floating]  #: a number for each pixel, 32 or 64 bits wide
 #: Px beside and beyond a ski that are looked at.
 REACH_PX: Final = 4.0
 #: Px along a ski that are taken together: the errors of the model are alike over more.
@@ -35,9 +37,9 @@ class Pixels:
 
     camera: Integers
     xy: Floats
-    grey: Floats
-    behind: Floats
-    noise: Floats
+    grey: Pixel
+    behind: Pixel
+    noise: Pixel
 
     def of_cameras(self, count: int) -> list[slice]:
         """Those of each of so many cameras."""
@@ -75,15 +77,18 @@ class SkiView:
     shift: Floats
     legs: Legs = field(default_factory=Legs)
 
-    def on_legs(self, xy: Floats) -> Flags:
-        """Which places (..., 2) in the image may show a leg."""
-        there = np.zeros(xy.shape[:-1], bool)
+    def on_legs(self, x: Pixel, y: Pixel) -> Flags:
+        """Which places (...) in the image may show a leg."""
+        there = np.zeros(x.shape, bool)
         for leg, half_m in zip(self.legs.ends + self.shift, np.hypot(_LEG_M, self.legs.sigma), strict=True):
             px = self.camera.project(leg)
             if np.isfinite(px).all():
                 scale = self.camera.camera.interior[0] / np.linalg.norm(leg - self.camera.position, axis=1)
-                along, away = _on_piece(xy, px)
-                there |= away < np.interp(along, (0.0, 1.0), half_m * scale)
+                along, away = _on_piece(x, y, px)
+                foot, hip = (half_m * scale).tolist()
+                along *= hip - foot
+                along += foot
+                there |= away < along
         return there
 
 
@@ -109,7 +114,7 @@ def pixels_around(views: Sequence[SkiView], poses: Poses, ends: Floats, reach_m:
         if region is not None:
             parts += [cells for k in range(SKIS) if len((cells := _cells(view, region, px, k, reach, c))[0])]
     if not parts:
-        return Pixels(np.zeros(0, np.intp), np.zeros((0, 2)), *np.zeros((3, 0)))
+        return Pixels(np.zeros(0, np.intp), np.zeros((0, 2)), *np.zeros((3, 0), np.float32))
     camera, xy, grey, behind, noise = (np.concatenate(part) for part in zip(*parts, strict=True))
     return Pixels(camera.astype(np.intp), xy, grey, behind, noise)
 
@@ -124,8 +129,9 @@ def _cells(view: SkiView, region: Region, px: Floats, k: int, reach: float, came
     xy = (px[k, 0] + t[:, None, None] * along + u[:, None] * np.array((-along[1], along[0]))).reshape(-1, 2)
     last = np.array(region.grey.shape[::-1]) - 1
     within = xy - (region.x, region.y)
-    xy = xy[((within >= 1) & (within <= last - 1)).all(axis=1) & (to_piece(xy, px[k]) <= to_piece(xy, px[1 - k]))]
-    xy = xy[~view.on_legs(xy)]
+    xy = xy[((within >= 1) & (within <= last - 1)).all(axis=1)]
+    xy = xy[to_piece(xy[:, 0], xy[:, 1], px[k]) <= to_piece(xy[:, 0], xy[:, 1], px[1 - k])]
+    xy = xy[~view.on_legs(xy[:, 0], xy[:, 1])]
     if not len(xy):
         return np.zeros(0), xy, *np.zeros((3, 0))
     steps = np.arange(CELL_PX) - (CELL_PX - 1) / 2
@@ -134,19 +140,24 @@ def _cells(view: SkiView, region: Region, px: Floats, k: int, reach: float, came
         cv2.remap(layer, each[..., 0], each[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).mean(axis=1)
         for layer in (region.grey, region.behind, region.sigma)
     )
-    noise = sigma.astype(float) ** 2 / CELL_PX
-    return np.full(len(xy), camera), xy, grey.astype(float), behind.astype(float), noise
+    return np.full(len(xy), camera), xy, grey, behind, sigma**2 / CELL_PX
 
 
-def to_piece(xy: Floats, ends: Floats) -> Floats:
-    """From places (n, 2) to the straight piece between two ends (2, 2), px."""
-    return _on_piece(xy, ends)[1]
+def to_piece(x: Pixel, y: Pixel, ends: Floats) -> Pixel:
+    """From places (...) to the straight piece between two ends (2, 2), px."""
+    return _on_piece(x, y, ends)[1]
 
 
-def _on_piece(xy: Floats, ends: Floats) -> tuple[Floats, Floats]:
-    """How far along a straight piece its nearest point to places (..., 2) is, 0 to 1, and how far that is, px."""
-    step = ends[1] - ends[0]
-    t = np.clip((xy - ends[0]) @ step / max(float(step @ step), 1e-9), 0, 1)
-    # The norm along an axis of two takes several times as long.
-    x, y = (xy[..., i] - ends[0, i] - t * step[i] for i in (0, 1))
-    return t, np.asarray(np.sqrt(x * x + y * y))
+def _on_piece(x: Pixel, y: Pixel, ends: Floats) -> tuple[Pixel, Pixel]:
+    """How far along a straight piece its nearest point to places (...) is, 0 to 1, and how far that is, px."""
+    (first_x, first_y), (step_x, step_y) = ends[0].tolist(), (ends[1] - ends[0]).tolist()
+    square = max(step_x**2 + step_y**2, 1e-9)
+    off_x, off_y = x - first_x, y - first_y
+    t = off_x * (step_x / square)
+    t += off_y * (step_y / square)
+    np.clip(t, 0, 1, out=t)
+    off_x -= t * step_x
+    off_y -= t * step_y
+    off_x *= off_x
+    off_x += off_y * off_y
+    return t, np.sqrt(off_x, out=off_x)

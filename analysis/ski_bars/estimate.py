@@ -156,10 +156,10 @@ class BarFit:
     def _contrast(self, x: Floats) -> Pixel:
         """(n,) of the ski that differs more from the static scene there."""
         bright = x[self.model.unknowns.brightness].T.astype(np.float32)
-        off = [
-            np.abs(bright[k].take(self.pixels.camera) - self.pixels.behind) for k in np.flatnonzero(self.model.present)
-        ]
-        return np.asarray(off[0] if len(off) == 1 else np.maximum(*off))
+        off = np.zeros_like(self.pixels.behind)
+        for k in np.flatnonzero(self.model.present):
+            np.maximum(off, np.abs(bright[k].take(self.pixels.camera) - self.pixels.behind), out=off)
+        return off
 
     def _model_variance(self, x: Floats, seen: Predicted, m: float) -> Pixel:
         shovel = ((seen.s > SHOVEL_M) & np.isfinite(seen.s)).any(axis=0)

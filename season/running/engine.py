@@ -49,6 +49,9 @@ class Hearer(Protocol):
     def started(self, name: str) -> None:
         """A task is under way, or again."""
 
+    def waiting(self) -> None:
+        """Tasks are under way; called every two seconds or more often."""
+
     def done(self, name: str) -> None:
         """A task has ended."""
 
@@ -208,6 +211,7 @@ class _Run:
             ProcessDiedError: no worker came back.
         """
         for _ in range(_PATIENCE):
+            self._hearer.waiting()
             if self._names:
                 with suppress(TimeoutError):
                     done, _ = wait(list(self._names), timeout=_LOOK_S, return_when="FIRST_COMPLETED")

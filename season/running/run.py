@@ -113,6 +113,9 @@ class _Hearer:
     def started(self, name: str) -> None:
         self._state.run(name)
 
+    def waiting(self) -> None:
+        self._state.write_sometimes()
+
     def done(self, name: str) -> None:
         try:
             found = decoded(read_outcomes([name], self._options)[0])

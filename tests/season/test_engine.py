@@ -44,6 +44,11 @@ def test_a_task_that_kills_two_workers_is_set_aside_and_no_other_is_accused(tmp_
     assert all(runs(tmp_path / name) <= 3 for name in names)  # beside one that killed its worker: again, alone
 
 
+def test_while_no_task_ends_somebody_hears_that_they_run(tmp_path: Path) -> None:
+    """So the state of a season is written while long logs are measured."""
+    assert run_tiny(tmp_path, ["patient"])["ended"] == {"patient": "done"}
+
+
 def test_workers_start_beside_files_of_the_names_of_modules(tmp_path: Path) -> None:
     user, program = tmp_path / "user", tmp_path / "bin" / "program.py"
     for folder in (user, program.parent, tmp_path / "done"):

@@ -11,16 +11,24 @@ from pathlib import Path
 from season.campaign import Cluster
 from season.running.engine import engine, run_tasks
 from tests.support.processes import peak_memory_bytes
+from tests.support.waiting import wait_until
+
+WAITED = "waited"
 
 
 class Heard:
-    """What is told of tasks, by name."""
+    """What is told of tasks, by name; that they are waited for makes a file."""
 
-    def __init__(self) -> None:
+    def __init__(self, waited: Path) -> None:
+        self.waited = waited
         self.ended: dict[str, str] = {}
 
     def started(self, name: str) -> None:
         """Nothing is kept."""
+
+    def waiting(self) -> None:
+        """What waits for this goes on."""
+        self.waited.touch()
 
     def done(self, name: str) -> None:
         self.ended[name] = "done"
@@ -33,11 +41,15 @@ class Heard:
 
 
 def note(path: Path) -> str:
-    """A task: notes that it runs; kills its worker or fails, if its name says so or each release gives memory back."""
+    """A task: notes that it runs; does what its name says, and fails if each release gives memory back."""
     with path.open("a") as file:
         file.write(f"{os.getpid()}\n")
     if "deadly" in path.name:
         os.kill(os.getpid(), signal.SIGKILL)
+    if "patient" in path.name:
+        waited = path.with_name(WAITED)
+        waited.unlink(missing_ok=True)
+        wait_until(waited.exists, "the tasks are waited for")
     if "wrong" in path.name:
         raise ValueError("wrong")
     if "MALLOC_TRIM_THRESHOLD_" in os.environ:
@@ -47,7 +59,7 @@ def note(path: Path) -> str:
 
 def main(folder: str, names: list[str]) -> None:
     """Run tasks of these names, which note in a folder that they run."""
-    heard = Heard()
+    heard = Heard(Path(folder) / WAITED)
     with engine(Cluster(workers=2, memory_gb=1.0), "127.0.0.1:0") as on:
         about = {"threads": on.threads, "dashboard": on.dashboard}
         run_tasks(on, note, {name: Path(folder) / name for name in names}, heard)

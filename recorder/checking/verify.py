@@ -9,11 +9,12 @@ from typing import Any
 from recorder.checking.pulse_check import PulseCheck
 from recorder.checking.structure_check import StructureCheck
 from recorder.checking.time_line import TimeLine
-from recorder.log.extent import apply_extent, ended_early, part_after, part_before
+from recorder.log.extent import apply_extent, ended_early
 from recorder.log.write_lock import is_being_written
 from recorder.reading.info import known_lost
 from recorder.reading.items import Chunk, Item, printable
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import missing_after, missing_before
 from recorder.reading.records import Damage
 from rig.events import Event
 from rig.topics import MERGE_METADATA
@@ -187,8 +188,8 @@ def verify(path: Path, progress: Callable[[int], None] | None = None) -> VerifyR
             path, reader.size, reader.closed, reader.truncated, pulses.ledger,
             pulses.recount.finish(merged=MERGE_METADATA in reader.metadata),
             findings.lines(), tuple(pulses.events), structure.data_checksum and structure.summary_checksum,
-            known_lost(reader), ended_early(reader.metadata), part_before(reader.metadata, path),
-            part_after(reader.metadata, path), being_written, tuple(times.in_words()), unclosed,
+            known_lost(reader), ended_early(reader.metadata), missing_before(reader.metadata, path),
+            missing_after(reader.metadata, path), being_written, tuple(times.in_words()), unclosed,
         )  # fmt: skip
 
 

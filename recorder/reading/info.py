@@ -11,15 +11,13 @@ from recorder.log.extent import (
     disk_trouble,
     ended_early_said,
     forgotten_s,
-    part_after,
-    part_before,
     part_number,
 )
 from recorder.log.session_changes import session_changes
 from recorder.log.write_lock import is_being_written
 from recorder.reading.items import Chunk, Message
 from recorder.reading.log_reader import LogReader
-from recorder.reading.parts import RecordingReader
+from recorder.reading.parts import RecordingReader, missing_after, missing_before
 from recorder.reading.records import Damage
 from recorder.reading.triplets import health_of, tag_of
 from rig.host.utc_clock import UtcState
@@ -224,8 +222,8 @@ def info(
             reader.metadata.get(RIG_METADATA, {}), known_lost(reader), reader.metadata.get(MERGE_METADATA, {}),
             reader.metadata.get(IMPORT_METADATA, {}), reader.metadata.get(COMPACT_METADATA, {}),
             disk_trouble(reader.metadata), forgotten_s(reader.metadata), ended_early_said(reader.metadata),
-            part_before(reader.metadata, reader.path), part_number(session),
-            reader.metadata.get(RECORDING_METADATA, {}).get(NEXT_PART, ""), part_after(reader.metadata, last),
+            missing_before(reader.metadata, reader.path), part_number(session),
+            reader.metadata.get(RECORDING_METADATA, {}).get(NEXT_PART, ""), missing_after(reader.metadata, last),
             messages, reader.library,
             None if told is None else told.finish(),
         )  # fmt: skip

@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
 
-from recorder.log.extent import CONTINUES, part_number
+from recorder.log.extent import CONTINUES, part_after, part_before, part_number
 from recorder.log.part_path import named, numbered
 from recorder.reading.items import Chunk, Item
 from recorder.reading.log_reader import LogReader
@@ -33,6 +33,18 @@ def parts_of(log: Path, session: Callable[[Path], Mapping[str, str] | None] | No
     while (after := _after(found[-1], told)) is not None:
         found.append(after)
     return tuple(found)
+
+
+def missing_before(metadata: Mapping[str, Mapping[str, str]], log: Path) -> str:
+    """Id of the log that this one continues, if it lies beside it neither as it was recorded nor renamed alike."""
+    said = part_before(metadata, log)
+    return "" if said and _before(log, _session) is not None else said
+
+
+def missing_after(metadata: Mapping[str, Mapping[str, str]], log: Path) -> str:
+    """The same of the log in which this one goes on."""
+    said = part_after(metadata, log)
+    return "" if said and _after(log, _session) is not None else said
 
 
 def _before(log: Path, told: Callable[[Path], Mapping[str, str] | None]) -> Path | None:

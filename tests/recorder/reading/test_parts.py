@@ -80,6 +80,10 @@ def test_parts_are_known_by_what_they_say(split: Split) -> None:
     renamed = [part.rename(part.with_name(part.name.replace("r1", "training"))) for part in parts]
     for part in renamed:
         assert list(tags(part)) == list(tags(log))
+        assert (info(part).part_before, info(part).part_after) == ("", "")
+        assert list(verify(part).parts_in_words()) == []
+    renamed[1].unlink()
+    assert info(renamed[0]).part_after == info(renamed[2]).part_before == "r1-part2"
 
 
 def test_another_recording_of_the_name_of_a_part_is_passed_over(tmp_path: Path, split: Split) -> None:

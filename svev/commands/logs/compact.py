@@ -6,10 +6,11 @@ from typing import Annotated, Final
 import typer
 
 from recorder.compacting.compact import compact
+from recorder.log.part_path import named, numbered
 from svev import console
 from svev.commands.logs.contents import AlsoJson, LogPath
 
-_ENDING: Final = ".compact.mcap"
+_ENDING: Final = ".compact"
 
 
 def compact_command(
@@ -36,7 +37,7 @@ def compact_command(
 
     Example: svev compact recordings/jump.mcap -o archive/jump.mcap
     """
-    target = log.with_name(log.name.removesuffix(".mcap") + _ENDING) if out is None else out
+    target = _beside(log) if out is None else out
     size = log.stat().st_size if log.is_file() else 0
     with console.progress("compacting", 2 * size) as done:
         report = compact(log, target, done)
@@ -48,3 +49,9 @@ def compact_command(
         f"({report.ratio:.2f} : 1); {report.ledger.summary_line()}"
     )
     console.say("read back from the disk: every frame has the checksum that the recorder gave it")
+
+
+def _beside(log: Path) -> Path:
+    """The new log of a part gets a name by which it is a part of the others' new logs."""
+    first, number = numbered(log)
+    return named(first + _ENDING, number, log)

@@ -22,6 +22,7 @@ from recorder.reading.coded_images import records_crc, with_images
 from recorder.reading.info import info
 from recorder.reading.items import Message
 from recorder.reading.log_reader import LogReader
+from recorder.reading.parts import parts_of
 from recorder.reading.triplets import stored_pulses, triplets
 from recorder.recovering.recover import recover
 from rig.clocks import UtcNs
@@ -44,6 +45,7 @@ from tests.recorder.logs import (
     open_writer,
     write_log,
 )
+from tests.recorder.split import split_log
 from tests.recorder.writing.test_log_writer import read_by_node
 
 JUMP = (ALL_OK, (OK, LOST, OK), (ABSENT,) * 3, ALL_OK, ALL_OK)
@@ -272,3 +274,15 @@ def test_the_command_says_how_much_smaller_and_info_what_it_is(
     assert main(["compact", str(log), "-o", str(tmp_path / "archive.mcap")]) == 0
     assert "read back from the disk" in capsys.readouterr().out
     assert FrameStatus.LOST in {status for run in verify(out).ledger.incomplete for _, status in run.cameras}
+
+
+def test_compacted_parts_are_parts_of_one_another_under_the_names_they_get(tmp_path: Path) -> None:
+    log = tmp_path / "jump.mcap"
+    write_log(log, JUMP)
+    for part in split_log(log, tmp_path / "r1.mcap", (2, 2)):
+        assert main(["compact", str(part)]) == 0
+        part.unlink()
+    compacted = [tmp_path / f"r1.compact{part}.mcap" for part in ("", "-part2", "-part3")]
+    for part in compacted:
+        assert parts_of(part) == tuple(compacted)
+        assert (info(part).part_before, info(part).part_after) == ("", "")

@@ -6,6 +6,7 @@ from typing import Annotated, Final
 
 from pydantic import Field, model_validator
 
+from rig.settings.store_options import StoreOptions
 from rig.settings.strict_toml import StrictModel, read_toml, validate
 
 Text = Annotated[str, Field(min_length=1, max_length=200)]
@@ -96,7 +97,7 @@ class Campaign(StrictModel):
 
     name: Text
     out: Path
-    store: dict[str, str | bool | int] = Field(default_factory=dict)
+    store: StoreOptions = Field(default_factory=dict)
     hills: Annotated[tuple[Hill, ...], Field(min_length=1)]
     cluster: Cluster = Cluster()
 

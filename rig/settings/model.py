@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from rig.images.pixels import Pixels
 from rig.settings.camera import COMMANDED, CameraSettings, Region
+from rig.settings.store_options import StoreOptions
 from rig.settings.strict_toml import StrictModel
 from rig.settings.trigger import (
     ActionTrigger,
@@ -190,7 +191,7 @@ class OffloadSettings(StrictModel):
         description="in place of `to`: where in an object store, for example s3://bucket/jumps; fsspec and its package "
         "for such addresses (s3fs, gcsfs) reach it, with the keys that these find in the environment",
     )
-    store_options: dict[str, str | bool | int] = Field(
+    store_options: StoreOptions = Field(
         {}, description="options of that package, for example endpoint_url; no keys: the rig file stands in every log"
     )
     keep_days: float | None = Field(

@@ -91,6 +91,11 @@ def test_the_schema_is_a_schema() -> None:
             HEAD + CAMERA + "gain_raw = 5\ngain_db = 1\n", '"cameras.1": K1 has gain_raw and gain_db', id="gain twice"
         ),
         pytest.param(
+            HEAD + CAMERA + '[offload]\nstore = "s3://jumps"\nstore_options = { key = "x" }\n',
+            '"offload.store_options": key is a secret, and others read this file: remove it here',
+            id="secret",
+        ),
+        pytest.param(
             HEAD + CAMERA + "[recorder]\nzzz = 1\n",
             'unknown key "recorder.zzz"; known keys here: directory, ',
             id="unknown",

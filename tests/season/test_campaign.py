@@ -29,6 +29,8 @@ def test_places_are_relative_to_the_file(tmp_path: Path) -> None:
         ('[[hills.days]]\nfirst = 2026-12-02\nlast = 2026-12-01\nsurvey = "x"', "is before first"),
         ('[[hills]]\nname = "Hill"\nlogs = ["x"]\nsurvey = "x"', "two hills are called"),
         ("[cluster]\nmemory_gb = 0", "cluster.memory_gb"),
+        ('[store]\nsecret = "x"', "secret is a secret, and others read this file"),
+        ('[store]\naccount_key = "x"', "account_key is a secret"),
     ],
 )
 def test_what_is_wrong_in_the_file_is_said(tmp_path: Path, more: str, message: str) -> None:

@@ -50,6 +50,16 @@ _JUMPS: Final = """
             FROM rows_jumps AS rows JOIN logs USING (key) WHERE logs.copy_of IS NULL)
     ORDER BY time_utc, log, jump
 """
+#: Logs whose jumps equal those of another log of the hill bit by bit: an archive is another file with the same images.
+_ARCHIVES: Final = """
+    WITH measured AS (SELECT key, list(hash({columns}) ORDER BY jump) AS found FROM rows_jumps GROUP BY key),
+    originals AS (
+        SELECT hill, found, arg_min(log, length(log)) AS original
+        FROM logs JOIN measured USING (key) WHERE copy_of IS NULL GROUP BY hill, found)
+    UPDATE logs SET copy_of = originals.original FROM originals, measured
+    WHERE logs.key = measured.key AND measured.found = originals.found AND logs.hill = originals.hill
+        AND logs.copy_of IS NULL AND logs.log <> originals.original
+"""
 _OTHERS: Final = """
     CREATE TABLE {table} AS
     SELECT logs.hill, rows.* FROM rows_{table} AS rows JOIN logs USING (key) WHERE logs.copy_of IS NULL
@@ -158,6 +168,9 @@ def _fill(
                         raise StorageError(f"{result_url(url)}: the result is gone; run the season again")
                     joined.write(content)
         _read(database, table, f"rows_{table.name}", scratch)
+        if table.name == "jumps":
+            columns = ", ".join(f'"{column}"' for column in table.columns if column != "key")
+            database.execute(_ARCHIVES.format(columns=columns))
         (scratch / table.file).unlink()
         database.execute(_JUMPS if table.name == "jumps" else _OTHERS.format(table=table.name))
         database.execute(f"DROP TABLE rows_{table.name}")

@@ -85,6 +85,26 @@ def test_a_corrected_name_counts_and_a_copied_log_does_not(tmp_path: Path) -> No
         assert asked(database, "SELECT athlete FROM jumps WHERE log = ?", [str(one)])[1] == [("Anna Ny",)]
 
 
+def test_the_archive_beside_a_log_counts_once(tmp_path: Path) -> None:
+    """Another file with another key, of which the same values came."""
+    season = draw_season(tmp_path, jumps=4)
+    season.campaign.out.mkdir()
+    one = sorted((tmp_path / "hill").glob("*.mcap"))[1]
+    archive = one.with_name(f"{one.stem}.compact.mcap")
+    shutil.copy2(one, archive)
+    shutil.copytree(one.with_suffix(".season"), archive.with_suffix(".season"))
+    (key,) = (log.outcome.key for log in find_logs(season.campaign) if log.url == str(one) and log.outcome)
+    for file in archive.with_suffix(".season").iterdir():
+        file.write_bytes(file.read_bytes().replace(key.encode(), key[::-1].encode()))
+    build(season.campaign, find_logs(season.campaign))
+    with opened(season.campaign.out) as database:
+        assert asked(database, "SELECT log, copy_of FROM logs WHERE copy_of IS NOT NULL")[1] == [
+            (str(archive), str(one))
+        ]
+        assert asked(database, "SELECT count(*) FROM jumps")[1] == [(4,)]
+        assert asked(database, "SELECT count(DISTINCT key) FROM pulses")[1] == [(4,)]
+
+
 def test_a_statement_cannot_change_or_read_anything_else(drawn: Drawn, tmp_path: Path) -> None:
     with opened(drawn.campaign.out) as database:
         for statement in (

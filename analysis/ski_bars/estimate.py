@@ -64,13 +64,14 @@ class BarFit:
         model: of the images.
         pixels: around the skis.
         expected: before.
+        drawn: whether a person says that there are skis.
 
     Attributes:
         used: (m, 2) which skis count in which images.
     """
 
-    def __init__(self, model: BarModel, pixels: Pixels, expected: ExpectedBars) -> None:
-        self.model, self.pixels = model, pixels
+    def __init__(self, model: BarModel, pixels: Pixels, expected: ExpectedBars, *, drawn: bool = False) -> None:
+        self.model, self.pixels, self.drawn = model, pixels, drawn
         self.used = np.tile(np.array(model.present), (len(model.views), 1))
         self._hidden: tuple[Floats, Flags] | None = None  # by boots, at the latest poses
         at = model.unknowns

@@ -55,7 +55,12 @@ class FittedBars:
 
 
 def fit_bars(
-    views: Sequence[SkiView], expected: ExpectedBars, present: tuple[bool, bool] = (True, True), *, near: bool = False
+    views: Sequence[SkiView],
+    expected: ExpectedBars,
+    present: tuple[bool, bool] = (True, True),
+    *,
+    near: bool = False,
+    drawn: bool = False,
 ) -> FittedBars:
     """Fit a pair of skis.
 
@@ -63,12 +68,13 @@ def fit_bars(
         views: images of one pulse.
         expected: where the skis should be, and how they are shaped.
         present: which of both there are; the other one is left as it is expected.
+        drawn: a person has drawn them: they are there.
         near: they are expected so nearly that a fit can start from there; no other places and ends are tried.
     """
     wide = min(_WIDEST_M, _REACH_SIGMAS * float(np.sqrt(np.diagonal(expected.covariance)[[2, 7]].max())))
     ends = expected.shape[:, 1:] + _REACH_SIGMAS * expected.shape_sigma[:, 1:] * (-1, 1)
     pixels = pixels_around(views, expected.poses, ends, wide)
-    fit = BarFit(BarModel(views, expected.poses, present), pixels, expected)
+    fit = BarFit(BarModel(views, expected.poses, present), pixels, expected, drawn=drawn)
     found = fit.solved(fit.start(np.zeros(POSE.stop)))
     if not near and expected.shape_sigma[:, 1:].max() > _UNSURE_END_M:
         found = fit.solved(_with_ends(fit, found.x))
@@ -99,7 +105,9 @@ def _judged(fit: BarFit, found: Estimate, good: Flags, lines: list[list[ImageLin
     }
     covariance = fit.covariance(found)
     step = found.x[POSE] - fit.mean[POSE]
-    seen = (fit.used.sum(axis=0) >= _FEWEST) & ~_free(fit, found)
+    seen = fit.used.sum(axis=0) >= _FEWEST
+    if not fit.drawn:
+        seen &= ~_free(fit, found)
     return FittedBars(
         fit.model.poses(found.x),
         covariance[POSE, POSE],

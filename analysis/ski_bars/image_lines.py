@@ -87,8 +87,9 @@ def image_lines(fit: BarFit, found: Estimate) -> list[list[ImageLine | None]]:
             mine = slice(REDUNDANCY * k, REDUNDANCY * (k + 1))
             believed = robust[near]
             noise = float((believed * fit.pixels.noise[near]).sum())
-            # Where both skis are one line in an image, it tells one ski and not two.
-            alone = fit.pixels.behind * (1 - seen.cover[1 - k]) + x[at.brightness[c, 1 - k]] * seen.cover[1 - k]
+            # Where both skis are one line in an image, it tells one ski and not two, unless a person has drawn both.
+            other = np.zeros_like(seen.cover[k]) if fit.drawn else seen.cover[1 - k]
+            alone = fit.pixels.behind * (1 - other) + x[at.brightness[c, 1 - k]] * other
             front = (fit.pixels.grey - alone)[near] ** 2
             without, unexplained = (float((believed * square).sum()) - noise for square in (front, off[near] ** 2))
             explained = 1 - max(unexplained, 0.0) / without if without > 0 else 0.0

@@ -256,7 +256,7 @@ def _fitted(
 ) -> FittedBars:  # fmt: skip
     rate = log.facts.rate_hz
     velocity = start.known[0].velocity if belief is None else belief.velocity.mean(axis=0) * rate
-    return fit_bars(ski_views(log, system, pulse, velocity), expected, present)
+    return fit_bars(ski_views(log, system, pulse, velocity), expected, present, drawn=True)
 
 
 def _put(found: Found, pulse: int, camera: str, line: str, seen: ImageLine, source: MarkSource) -> None:

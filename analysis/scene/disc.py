@@ -22,12 +22,10 @@ from math import log, pi, sqrt
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chndtr, erfc, i0e, i1e
 
-from rig.arrays import Flags, Floats, Integers
+from rig.arrays import Flags, Floats, Integers, Reals
 
-Pixel = NDArray[np.floating]  #: a number for each pixel, 32 or 64 bits wide
 _UNKNOWNS = 10
 MARGIN: Final = 3.6  #: px beyond the disc that are fitted
 _WIDER, _MARGIN_OF_WIDER = 1.35, 2.2  # times the radius and px: of a large one that is approximate more is needed
@@ -129,7 +127,7 @@ def fit_discs(
     return discs
 
 
-def cover(r: Pixel, radius: Pixel, blur: Pixel) -> tuple[Pixel, Pixel, Pixel]:
+def cover(r: Reals, radius: Reals, blur: Reals) -> tuple[Reals, Reals, Reals]:
     """Blurred discs (n,) at distances r (n, k): value, derivative by r, derivative by the radius."""
     value, by_r, by_radius = np.empty((3, *r.shape), r.dtype)
     sharp = radius / blur > _SHARP
@@ -140,19 +138,19 @@ def cover(r: Pixel, radius: Pixel, blur: Pixel) -> tuple[Pixel, Pixel, Pixel]:
     return value, by_r, by_radius
 
 
-def _cover_sharp(r: Pixel, radius: Pixel, blur: Pixel) -> tuple[Pixel, Pixel, Pixel]:
+def _cover_sharp(r: Reals, radius: Reals, blur: Reals) -> tuple[Reals, Reals, Reals]:
     u = (r - radius + blur**2 / (2 * radius)) / blur
     edge = np.exp(-0.5 * u**2) / (sqrt(2 * pi) * blur)
     return np.asarray(0.5 * erfc(u / sqrt(2))), -edge, edge
 
 
-def _cover_soft(r: Pixel, radius: Pixel, blur: Pixel) -> tuple[Pixel, Pixel, Pixel]:
+def _cover_soft(r: Reals, radius: Reals, blur: Reals) -> tuple[Reals, Reals, Reals]:
     a, b = r / blur, radius / blur
     common = (b / blur) * np.exp(-0.5 * (a - b) ** 2)
     return _share(a, b), np.asarray(-common * i1e(a * b)), np.asarray(common * i0e(a * b))
 
 
-def _share(a: Pixel, b: Pixel) -> Pixel:
+def _share(a: Reals, b: Reals) -> Reals:
     """The distribution function itself, which is slow: cubic between nodes that are dense enough for 1e-5.
 
     Args:

@@ -10,11 +10,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.scene.disc import MARGIN, Disc, cover
 from analysis.scene.ground import BLUR, CLEAR, REACH, ground_behind
-from rig.arrays import Flags, Floats, Integers
+from rig.arrays import Flags, Floats, Floats32, Integers
 
 _MODEL = 0.05  # of the contrast: standard deviation of what a ball's surface differs from one grey value
 _RADIUS_SPREAD = 0.3  # of log R about that of the blob
@@ -26,8 +25,6 @@ _SHADE = 0.7  # of the contrast, per radius: what a light from the side does
 _NEXT_TO_NOTHING = 1e-9  # weight of an unknown without prior: where an image is flat, nothing tells of it
 _STEPS = 10
 _FARTHEST, _LARGEST = 0.7, 0.25  # of a step: px; log R
-
-_Pixel = NDArray[np.float32]
 
 
 @dataclass(slots=True, eq=False)
@@ -47,10 +44,10 @@ class _Discs:
 
     index: Integers
     middle: Integers
-    x: _Pixel
-    y: _Pixel
-    grey: _Pixel
-    sigma: _Pixel
+    x: Floats32
+    y: Floats32
+    grey: Floats32
+    sigma: Floats32
     xy: Floats
     size: Floats
     stretch: Floats
@@ -71,10 +68,10 @@ class _Equations:
 
     normal: Floats
     right: Floats
-    v: _Pixel
-    ground: _Pixel
-    contrast: _Pixel
-    weight: _Pixel
+    v: Floats32
+    ground: Floats32
+    contrast: Floats32
+    weight: Floats32
 
 
 def fit_shaded_discs(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> list[Disc | None]:
@@ -156,7 +153,7 @@ def _judged(discs: _Discs, start: Floats, moved: Floats) -> list[Disc | None]:
     ]
 
 
-def _model(discs: _Discs) -> tuple[_Pixel, _Pixel, tuple[_Pixel, ...], Flags]:
+def _model(discs: _Discs) -> tuple[Floats32, Floats32, tuple[Floats32, ...], Flags]:
     """The ground (m, p), the discs (m, p), their derivatives by x, y, log R and stretch, and the fitted pixels."""
     dx, dy = (of - at.astype(np.float32)[:, None] for of, at in zip((discs.x, discs.y), discs.xy.T, strict=True))
     p, q = discs.stretch.astype(np.float32).T[..., None]
@@ -180,7 +177,7 @@ def _model(discs: _Discs) -> tuple[_Pixel, _Pixel, tuple[_Pixel, ...], Flags]:
     return ground, disc, derivatives, inside & (beyond < REACH)
 
 
-def _of_disc(values: _Pixel, disc: _Pixel) -> _Pixel:
+def _of_disc(values: Floats32, disc: Floats32) -> Floats32:
     """Means (m,) of values (m, p) under the discs."""
     return np.asarray((values * disc).sum(axis=1) / np.maximum(disc.sum(axis=1), np.float32(1e-9)))
 

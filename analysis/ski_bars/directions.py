@@ -22,8 +22,8 @@ import numpy as np
 
 from analysis.ski_bars.bars import SKIS, USUAL_SHAPE
 from analysis.ski_bars.model import BOOT_M, SHOVEL_M
-from analysis.ski_bars.pixels import Pixel, SkiView, to_piece
-from rig.arrays import Flags, Floats, Integers
+from analysis.ski_bars.pixels import SkiView, to_piece
+from rig.arrays import Flags, Floats, Integers, Reals
 
 #: Slope and heading of a ski against the flight, rad, standard deviations, and how far from it they are sought: no ski
 #: is steeper before the landing.
@@ -347,7 +347,7 @@ def _line_sums(view: SkiView, lines: _Bundle, taken: tuple[Floats, Floats] | Non
     return np.concatenate((np.zeros((*gain.shape[:2], 1)), alike * np.cumsum(gain, axis=-1)), axis=-1), aside
 
 
-def _as_ski(grey: Pixel, behind: Pixel, variance: Pixel, scene: Pixel, arms: Flags, r: Floats) -> Pixel:
+def _as_ski(grey: Reals, behind: Reals, variance: Reals, scene: Reals, arms: Flags, r: Floats) -> Reals:
     """Densities of pixels (..., n) of lines that a ski lies on, logarithms.
 
     How bright the ski is tells its whole length or its half near the binding, whichever fits better: a ski that leads
@@ -362,7 +362,7 @@ def _as_ski(grey: Pixel, behind: Pixel, variance: Pixel, scene: Pixel, arms: Fla
         r: (n,) m along the lines.
     """
 
-    def with_brightness_of(part: Flags) -> Pixel:
+    def with_brightness_of(part: Flags) -> Reals:
         bright = np.median(grey[..., part], axis=-1, keepdims=True)
         misfit = variance + (_MODEL * (bright - behind)) ** 2 + _ROUGH**2
         return np.asarray(np.log(_ON_SKI * _density(grey - bright, misfit) + _THROUGH * scene + _COVERED * _ANYTHING))
@@ -372,5 +372,5 @@ def _as_ski(grey: Pixel, behind: Pixel, variance: Pixel, scene: Pixel, arms: Fla
     return np.where(better, near, whole)
 
 
-def _density(off: Pixel, variance: Pixel) -> Pixel:
+def _density(off: Reals, variance: Reals) -> Reals:
     return np.asarray(np.exp(-off * off / (2 * variance)) / np.sqrt(2 * np.pi * variance))

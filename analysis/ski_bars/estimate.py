@@ -17,8 +17,8 @@ import numpy as np
 
 from analysis.ski_bars.bars import SKIS, ExpectedBars
 from analysis.ski_bars.model import POSE, SHAPE, SHOVEL_M, BarModel, Predicted, hidden_by_boots
-from analysis.ski_bars.pixels import CELL_PX, Pixel, Pixels
-from rig.arrays import Flags, Floats
+from analysis.ski_bars.pixels import CELL_PX, Pixels
+from rig.arrays import Flags, Floats, Reals
 
 _ALONG_PX, _ACROSS_PX = 10.0, 1.5  # over which errors of the model are alike
 _TOGETHER: Final = 2 * _ALONG_PX * 2 * _ACROSS_PX / CELL_PX  # cells with one error
@@ -154,7 +154,7 @@ class BarFit:
             / 2
         )
 
-    def _contrast(self, x: Floats) -> Pixel:
+    def _contrast(self, x: Floats) -> Reals:
         """(n,) of the ski that differs more from the static scene there."""
         bright = x[self.model.unknowns.brightness].T.astype(np.float32)
         off = np.zeros_like(self.pixels.behind)
@@ -162,30 +162,34 @@ class BarFit:
             np.maximum(off, np.abs(bright[k].take(self.pixels.camera) - self.pixels.behind), out=off)
         return off
 
-    def _model_variance(self, x: Floats, seen: Predicted, m: float) -> Pixel:
+    def _model_variance(self, x: Floats, seen: Predicted, m: float) -> Reals:
         shovel = ((seen.s > SHOVEL_M) & np.isfinite(seen.s)).any(axis=0)
         error = np.where(shovel, np.float32(np.hypot(m, _SHOVEL)), np.float32(m)) * self._contrast(x)
         return np.asarray(error * error)
 
-    def robust(self, x: Floats, seen: Predicted, m: float) -> Pixel:
+    def robust(self, x: Floats, seen: Predicted, m: float) -> Reals:
         """(n,) weights of the pixels: 1 where the model holds, else towards 0."""
         return self._robust(seen, self._model_variance(x, seen, m))
 
-    def _robust(self, seen: Predicted, model: Pixel) -> Pixel:
+    def _robust(self, seen: Predicted, model: Reals) -> Reals:
         square = (self.pixels.grey - seen.grey) ** 2 / (self.pixels.noise + model)
         return np.asarray((_SIGMAS**2 / (square + _SIGMAS**2)) ** 2)
 
-    def weights(self, x: Floats, seen: Predicted, fitted: Flags, m: float) -> Pixel:
+    def weights(self, x: Floats, seen: Predicted, fitted: Flags, m: float) -> Reals:
         """(n,) weights in the normal equations: errors that neighbours share count once."""
         model = self._model_variance(x, seen, m)
         return np.asarray(fitted * self._robust(seen, model) / (self.pixels.noise + _TOGETHER * model))
 
     def fitted(self, x: Floats, seen: Predicted) -> Flags:
         """(n,) which pixels count: those of used images that no boot may hide."""
+        nearest = np.abs(seen.u).argmin(axis=0)
+        return np.asarray(self.used[self.pixels.camera, nearest] & ~self.hidden(x))
+
+    def hidden(self, x: Floats) -> Flags:
+        """(n,) which pixels boots and bindings may hide; those of the latest poses are kept."""
         if self._hidden is None or (self._hidden[0] != x[POSE]).any():
             self._hidden = x[POSE].copy(), hidden_by_boots(self.model, x, self.pixels)
-        nearest = np.abs(seen.u).argmin(axis=0)
-        return np.asarray(self.used[self.pixels.camera, nearest] & ~self._hidden[1])
+        return self._hidden[1]
 
     def _model_error(self, x: Floats, seen: Predicted) -> float:
         near = ((np.abs(seen.u) < seen.half + _BESIDE_PX) & (seen.s < SHOVEL_M)).any(axis=0) & self.fitted(x, seen)
@@ -206,7 +210,7 @@ class BarFit:
         return np.asarray(inverse @ (by_noise + by_model + self.prior) @ inverse)
 
     def sandwich(
-        self, x: Floats, seen: Predicted, rows: Pixel, fitted: Flags, m: float
+        self, x: Floats, seen: Predicted, rows: Reals, fitted: Flags, m: float
     ) -> tuple[Floats, Floats, Floats]:
         """Normal equations of the pixels, and the covariances of their right side by noise and by errors of the model.
 
@@ -231,5 +235,5 @@ class BarFit:
         return np.asarray(rows @ weighted.T), np.asarray(by_noise), by_model
 
 
-def _apart(place: Pixel) -> Pixel:
+def _apart(place: Reals) -> Reals:
     return np.asarray(np.abs(place[:, None] - place))

@@ -10,7 +10,7 @@ from scipy.special import chdtri
 from analysis.ski_bars.bars import OF_POSE, OF_SHAPE, SKIS, ExpectedBars, Poses
 from analysis.ski_bars.estimate import WORST_MODEL, BarFit, Estimate
 from analysis.ski_bars.image_lines import REDUNDANCY, ImageLine, image_lines
-from analysis.ski_bars.model import POSE, SHAPE, SHOVEL_M, BarModel, hidden_by_boots
+from analysis.ski_bars.model import POSE, SHAPE, SHOVEL_M, BarModel
 from analysis.ski_bars.pixels import SkiView, pixels_around
 from rig.arrays import Flags, Floats
 
@@ -148,7 +148,7 @@ def _free(fit: BarFit, found: Estimate) -> Flags:
     sigma = np.sqrt(pixels.noise)
     scene = np.abs(pixels.grey - pixels.behind) < _SCENE_SIGMAS * sigma
     free = np.zeros(SKIS, bool)
-    alone = ~hidden_by_boots(fit.model, found.x, pixels)
+    alone = ~fit.hidden(found.x)
     for k in np.flatnonzero(fit.used.any(axis=0)).tolist():
         contrast = np.abs(bright[fit.used[:, k], k, None] - pixels.behind).min(axis=0)
         telling = alone & (seen.cover[k] > _CORE) & (seen.cover[1 - k] < 1 - _CORE) & (seen.s[k] < SHOVEL_M)

@@ -23,8 +23,8 @@ import numpy as np
 
 from analysis.scene.camera_system import PlacedCamera
 from analysis.ski_bars.bars import OF_POSE, OF_SHAPE, SKIS, Poses, axis_points
-from analysis.ski_bars.pixels import Pixel, Pixels, SkiView
-from rig.arrays import Flags, Floats, Integers
+from analysis.ski_bars.pixels import Pixels, SkiView
+from rig.arrays import Flags, Floats, Integers, Reals
 
 POSE: Final = slice(0, SKIS * OF_POSE)
 SHAPE: Final = slice(POSE.stop, POSE.stop + SKIS * OF_SHAPE)
@@ -88,15 +88,15 @@ class Predicted:
         half: (2, n) px.
     """
 
-    grey: Pixel
-    by_unknowns: Pixel
-    u: Pixel
-    t: Pixel
-    s: Pixel
-    cover: Pixel
-    by_u: Pixel
-    by_t: Pixel
-    half: Pixel
+    grey: Reals
+    by_unknowns: Reals
+    u: Reals
+    t: Reals
+    s: Reals
+    cover: Reals
+    by_u: Reals
+    by_t: Reals
+    half: Reals
 
 
 class BarModel:
@@ -243,13 +243,13 @@ class _Feet:
         nearer: by camera the ski that is nearer to it.
     """
 
-    u: Pixel
-    t: Pixel
-    s: Pixel
-    scale: Pixel
-    px_per_m: Pixel
-    across: Pixel
-    along: Pixel
+    u: Reals
+    t: Reals
+    s: Reals
+    scale: Reals
+    px_per_m: Reals
+    across: Reals
+    along: Reals
     nearer: Integers
 
 
@@ -267,7 +267,7 @@ def _derivatives(camera: PlacedCamera, places: Floats) -> Floats:
     return camera.linearised(places.reshape(-1, 3), px.reshape(-1, 2))[1].reshape(*places.shape[:-1], 2, 3)
 
 
-def _normal(value: Pixel) -> tuple[Pixel, Pixel]:
+def _normal(value: Reals) -> tuple[Reals, Reals]:
     """Density and distribution function of the normal distribution, the latter within 1e-7.
 
     Abramowitz and Stegun, Handbook of Mathematical Functions, 26.2.17: faster than that of SciPy by far.

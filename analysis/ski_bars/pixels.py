@@ -7,14 +7,12 @@ from typing import Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.candidates.foreground.background import Region
 from analysis.scene.camera_system import PlacedCamera
 from analysis.ski_bars.bars import SKIS, Poses
-from rig.arrays import Flags, Floats, Integers
+from rig.arrays import Flags, Floats, Integers, Reals
 
-Pixel = NDArray[np.floating]  #: a number for each pixel, 32 or 64 bits wide
 #: Px beside and beyond a ski that are looked at.
 REACH_PX: Final = 4.0
 #: Px along a ski that are taken together: the errors of the model are alike over more.
@@ -37,9 +35,9 @@ class Pixels:
 
     camera: Integers
     xy: Floats
-    grey: Pixel
-    behind: Pixel
-    noise: Pixel
+    grey: Reals
+    behind: Reals
+    noise: Reals
 
     def of_cameras(self, count: int) -> list[slice]:
         """Those of each of so many cameras."""
@@ -77,7 +75,7 @@ class SkiView:
     shift: Floats
     legs: Legs = field(default_factory=Legs)
 
-    def on_legs(self, x: Pixel, y: Pixel) -> Flags:
+    def on_legs(self, x: Reals, y: Reals) -> Flags:
         """Which places (...) in the image may show a leg."""
         there = np.zeros(x.shape, bool)
         for leg, half_m in zip(self.legs.ends + self.shift, np.hypot(_LEG_M, self.legs.sigma), strict=True):
@@ -143,12 +141,12 @@ def _cells(view: SkiView, region: Region, px: Floats, k: int, reach: float, came
     return np.full(len(xy), camera), xy, grey, behind, sigma**2 / CELL_PX
 
 
-def to_piece(x: Pixel, y: Pixel, ends: Floats) -> Pixel:
+def to_piece(x: Reals, y: Reals, ends: Floats) -> Reals:
     """From places (...) to the straight piece between two ends (2, 2), px."""
     return _on_piece(x, y, ends)[1]
 
 
-def _on_piece(x: Pixel, y: Pixel, ends: Floats) -> tuple[Pixel, Pixel]:
+def _on_piece(x: Reals, y: Reals, ends: Floats) -> tuple[Reals, Reals]:
     """How far along a straight piece its nearest point to places (...) is, 0 to 1, and how far that is, px."""
     (first_x, first_y), (step_x, step_y) = ends[0].tolist(), (ends[1] - ends[0]).tolist()
     square = max(step_x**2 + step_y**2, 1e-9)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gamma
 
-from rig.arrays import Flags, Floats, Integers
+from rig.arrays import Flags, Floats, Floats32, Integers
 
 UNKNOWNS: Final = 10
 _TIGHT, _HALF_SIGMAS, _HALF_CONTRAST = 2.0, 3.0, 0.06  # the same in px; residuals that count half
@@ -120,17 +120,16 @@ def _second_moment(log_size: Floats, log_shape: Floats) -> Floats:
 
 
 _Fitted = tuple[Floats, Floats, Floats, Floats, Flags]
-_Pixel = NDArray[np.float32]  # (n, k) a number for each pixel of each spot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Windows:
     """The pixels around spots: places relative to a whole pixel near each, grey values, 1 / noise or 0."""
 
-    x: _Pixel
-    y: _Pixel
-    grey: _Pixel
-    weight: _Pixel
+    x: Floats32
+    y: Floats32
+    grey: Floats32
+    weight: Floats32
 
     def only(self, chosen: Integers | Flags) -> "_Windows":
         """Those of some spots."""
@@ -276,11 +275,11 @@ class _Shape:
         self.grey += b + bx * self._dx
         self.grey += by * self._dy
 
-    def linear(self) -> _Pixel:
+    def linear(self) -> Floats32:
         """Derivatives (n, 4, k) of the grey values by contrast and plane."""
         return np.stack((self._value, np.ones_like(self._dx), self._dx, self._dy), axis=1)
 
-    def design(self) -> _Pixel:
+    def design(self) -> Floats32:
         """Derivatives (n, 10, k) of the grey values."""
         u, w, dx, dy = self._u, self._w, self._dx, self._dy
         by_power = self._power * self._value
@@ -317,14 +316,14 @@ def _windows(
     return _Windows(relative[0], relative[1], grey[place], np.where(near, 1 / sigma[place], np.float32(0)))
 
 
-def _share(v: _Pixel, weight: _Pixel, contrast: Floats) -> _Pixel:
+def _share(v: Floats32, weight: Floats32, contrast: Floats) -> Floats32:
     """How much residuals (n, k) count (Cauchy): half at some sigmas and a part of the contrast."""
     half = _HALF_SIGMAS / np.maximum(weight, np.float32(1e-9))
     half += (_HALF_CONTRAST * np.abs(contrast)[:, None]).astype(np.float32)
     return np.asarray(1 / (1 + (v / half) ** 2))
 
 
-def _sums(one: _Pixel, other: _Pixel) -> Floats:
+def _sums(one: Floats32, other: Floats32) -> Floats:
     """Sums (n,) of products over the pixels of each spot."""
     return np.asarray(np.einsum("nk,nk->n", one, other), float)
 

@@ -16,7 +16,6 @@ from bench.analysis.hill_logs import HillLog
 from rig.api.digitizing import PlaceAction, Tracking, TrackOrder
 from simrig.world.conditions.effects import MissingMarker
 from simrig.world.scenario import load_scenario
-from tests.support.at_hand import analysis_at_hand
 from tests.support.kept import kept_hill_log, kept_object
 
 #: Scatter of a click, px.
@@ -66,7 +65,6 @@ def placed(log: HillLog, folder: Path) -> HillLog:
 
 def opened(log: HillLog, *, survey: bool = True) -> Desk:
     """The desk at which it is measured, with the cameras oriented."""
-    analysis_at_hand()
     source = read_source(log.survey, None) if survey else None
     files = DeskFiles(log.path, log.path.with_suffix(".digitized"), log.path.with_suffix(".measured"))
     desk = Desk(files, lambda: source)

@@ -19,7 +19,6 @@ from simrig.world.conditions.effects import MissingMarker
 from tests.analysis.digitizing.hill import adopt, orientation_of
 from tests.analysis.simulated import SIZE, training
 from tests.browser.conftest import Open
-from tests.support.at_hand import analysis_at_hand
 from tests.support.kept import kept_hill_log
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
@@ -114,7 +113,6 @@ def desk_by_survey(rendered: HillLog, service: MemoryService, panel: Panel) -> I
     """The rendered jump in the panel; when it is opened first, its cameras are oriented by the survey."""
     log = Path(shutil.copy(rendered.path, service.catalogue.directory / "jump.mcap"))
     service.survey = rendered.survey
-    analysis_at_hand()
     with panel.client() as client:
         client.base_url = f"{panel.url}/api/recordings/jump/digitizing"
         yield Desk(f"{panel.url}/digitize.html?recording=jump", rendered, client, log)

@@ -8,13 +8,14 @@ import numpy as np
 from photogrammetry.geometry.camera_model import INTERIOR, camera_coordinates, image_point
 from photogrammetry.geometry.rotation import rotation_from_vector
 from photogrammetry.network.model import Camera, Image, ImageFrame, ImageObservations, Network, Point, Role
-from photogrammetry.network.selection import only_points, rays
+from photogrammetry.network.selection import only_observations, only_points, rays
 from rig.arrays import Floats
 from rig.images.viewing import look_at
 
 _SIGMA_PX, _SIGMA_SURVEY_M = 0.33, 0.012
 _SIZE = (640, 480)
 _SURVEYED, _TIES, _HELMETS = 15, 6, 17
+_FEW_POINTS, _FEW_RAYS = 8, (6, 6, 5)  # of the hill that shows little, and of its images
 _FAR_M = 10.0  # exchanged points are at least so far apart
 _SMALLEST_M, _LARGEST_M = 0.1, 10.0  # errors of the survey
 _SMALLEST_PX, _LARGEST_PX = 3.0, 100.0
@@ -146,6 +147,19 @@ def other_station(count: int) -> Spoil:
         return _surveyed(case, lambda i, xyz: xyz + (i in chosen) * off, tuple(f"B{i + 1}" for i in chosen))
 
     return spoil
+
+
+def few_rays(case: Hill, rng: np.random.Generator) -> Hill:
+    """Only eight surveyed points, of which two images show six and one shows five; an image point is wrong."""
+    network = only_points(case.network, np.arange(len(case.network.points)) < _FEW_POINTS)
+    image = network.observations.image
+    kept = np.ones(len(image), bool)
+    for i, count in enumerate(_FEW_RAYS):
+        kept[rng.permutation(np.flatnonzero(image == i))[count:]] = False
+    network = only_observations(network, kept)
+    xy = network.observations.xy.copy()
+    xy[np.flatnonzero(network.observations.image == 1)[0]] += rng.choice([-1, 1], 2) * rng.uniform(3.0, 6.0, 2)
+    return replace(case, network=replace(network, observations=replace(network.observations, xy=xy)))
 
 
 def other_unit(factor: float, count: int = _SURVEYED) -> Spoil:

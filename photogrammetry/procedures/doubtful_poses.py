@@ -19,7 +19,7 @@ from photogrammetry.network.diagnosis import (
     RefusedError,
 )
 from photogrammetry.network.model import Camera, Network
-from photogrammetry.network.selection import with_interior
+from photogrammetry.network.selection import with_interior, without_survey
 from photogrammetry.procedures.minima import Minimum, moved_images, possible_minima
 from photogrammetry.procedures.place_profile import place_holds
 from photogrammetry.start_values.resection import resect
@@ -172,23 +172,31 @@ def refuse_contradicted(given: Network, a: Adjustment) -> None:
         raise RefusedError(phrase("refused_units", text, factor=f"{factor:.4g}"))
 
 
-def refuse_exchanged_cameras(alone: Network, ratio: float) -> None:
+def refuse_exchanged_cameras(network: Network, ratio: float) -> None:
     """Refuse images that do not fit each other, but do once two of them exchange their cameras.
 
+    Few rays form some block with nearly any cameras. So the survey is asked as well: where the exchange does not help
+    there, the block is bad for another reason.
+
     Args:
-        alone: the images without survey.
-        ratio: estimated over a-priori sigma0 that they have as they are; infinite if they form no block.
+        network: with its survey.
+        ratio: estimated over a-priori sigma0 that the images alone have as they are; infinite if they form no block.
 
     Raises:
         RefusedError: names the two images.
     """
+    alone = without_survey(network)
     if ratio <= BENT or len(alone.images) > _IMAGES:
         return
     enough = min(ratio, BENT * BENT) if np.isinf(ratio) else ratio  # beside no block at all any other one looks good
-    trials = [(trial, pair) for pair, network in _exchanges(alone) if (trial := _ratio(network)) * BENT < enough]
+    trials = [(trial, pair) for pair, other in _exchanges(alone) if (trial := _ratio(other)) * BENT < enough]
     if not trials:
         return
     least, (one, other) = min(trials)
+    with_survey = next(exchanged for pair, exchanged in _exchanges(network) if pair == (one, other))
+    as_they_are = _ratio(network)
+    if np.isfinite(as_they_are) and _ratio(with_survey) * BENT >= as_they_are:
+        return
     text = (
         "images {one} and {other} look exchanged: once each has the other's camera, sigma0 is {least} times the a "
         "priori one, and {before} times as they are; exchange their measurements or their cameras"

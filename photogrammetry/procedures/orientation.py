@@ -18,7 +18,7 @@ from photogrammetry.network.selection import only_points, require_unknown_poses
 from photogrammetry.procedures.doubtful_poses import refuse_ambiguous, refuse_contradicted
 from photogrammetry.procedures.findings import Stage
 from photogrammetry.procedures.left_out import START_CAUTION, unplaced_points, without_images, without_points
-from photogrammetry.procedures.stages import constrained_stage, search_block
+from photogrammetry.procedures.stages import by_survey_alone, constrained_stage, search_block
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
 from rig.phrase import Phrase, phrase
@@ -110,9 +110,26 @@ def _oriented(network: Network) -> tuple[Outcome, tuple[Stage, ...], list[Phrase
 
 
 def _in_stages(network: Network) -> tuple[Outcome, tuple[Stage, ...]]:
+    """The three stages.
+
+    Few rays form a block nearly anywhere. So where observations are taken out, the survey alone leads to start values
+    as well, and the result that takes out less is given.
+    """
     search = search_block(network)
     outcome, stage = constrained_stage(search)
-    return settled(outcome), (*search.stages, stage)
+    stages = (*search.stages, stage)
+    if _taken_out(outcome):
+        try:
+            other, stage = constrained_stage(by_survey_alone(network))
+        except (BadInputError, NotSolvableError, NotConvergedError, RefusedError):
+            return settled(outcome), stages
+        if _taken_out(other) < _taken_out(outcome):
+            return settled(other), (stage,)
+    return settled(outcome), stages
+
+
+def _taken_out(outcome: Outcome) -> int:
+    return len(outcome.removed) + len(outcome.aside)
 
 
 def _with_interior(network: Network, uncertain: bool) -> tuple[Network, list[str]]:

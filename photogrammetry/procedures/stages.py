@@ -28,7 +28,6 @@ from photogrammetry.adjustment.solution.global_test import GlobalTest
 from photogrammetry.adjustment.solution.usability import is_unusable
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError, RefusedError
 from photogrammetry.network.model import Network
-from photogrammetry.network.selection import without_survey
 from photogrammetry.procedures.doubtful_poses import refuse_contradicted, refuse_exchanged_cameras
 from photogrammetry.procedures.findings import STAGE_RISK, SURVEYED, Finding, Stage, StageName, told_of, too_many
 from photogrammetry.procedures.free_block import (
@@ -78,7 +77,7 @@ def search_block(network: Network) -> Search:
     """
     free, gone, stage = free_stage(network)
     cleaned = without_removed(network, gone)
-    refuse_exchanged_cameras(without_survey(cleaned), np.inf if free is None else free.adjustment.ratio)
+    refuse_exchanged_cameras(cleaned, np.inf if free is None else free.adjustment.ratio)
     if free is None:
         nothing = Stage(StageName.SIMILARITY, "left out: there is no free block")
         return Search(cleaned, None, (), (stage, nothing))
@@ -88,7 +87,10 @@ def search_block(network: Network) -> Search:
     except RefusedError as error:
         start = _start_by_survey(cleaned, None)
         if start is None:
-            raise
+            search = by_survey_alone(network)
+            if not _holds(search):
+                raise
+            return search
         return _without_block(network, Search(cleaned, start, tuple(gone), (stage, _other_block(str(error)))))
     start = None if fit is None else carried(cleaned, block, free, fit.estimate.transform)
     if start is not None and second.findings and (other := _start_by_survey(cleaned, start)) is not None:
@@ -98,6 +100,11 @@ def search_block(network: Network) -> Search:
     left = without_removed(network, removed)
     start = None if fit is None else carried(left, block, free, fit.estimate.transform)
     return Search(left, start, removed, (stage, second))
+
+
+def by_survey_alone(network: Network) -> Search:
+    """What is left to the third stage where the survey alone leads to start values: everything."""
+    return Search(network, None, (), ())
 
 
 def _start_by_survey(network: Network, by_block: State | None) -> State | None:
@@ -123,6 +130,14 @@ def _start_by_survey(network: Network, by_block: State | None) -> State | None:
         if not is_worse(Minimum.of(other), Minimum.of(found), found.redundancy):
             return None
     return found.state
+
+
+def _holds(search: Search) -> bool:
+    """Whether the third stage comes to a result that fits."""
+    try:
+        return constrained_stage(search)[0].adjustment.ratio <= BENT
+    except (BadInputError, NotSolvableError, NotConvergedError, RefusedError):
+        return False
 
 
 def _other_block(words: str) -> Stage:

@@ -11,6 +11,7 @@ from bench.photogrammetry.hills import (
     Spoil,
     exchanged_cameras,
     exchanged_names,
+    few_rays,
     hill,
     mirrored,
     other_station,
@@ -88,6 +89,13 @@ def test_a_survey_that_contradicts_the_images_is_refused(spoil: Spoil, poses: bo
     case = _spoilt(spoil, 6, poses=poses)
     with pytest.raises(RefusedError, match=words):
         orient(case.network)
+
+
+@pytest.mark.parametrize("seed", repeats([1, 2, 3, *range(4, 40)], quick=3))
+def test_one_wrong_image_point_among_few_rays_leads_to_no_other_block(seed: int) -> None:
+    """The images alone form a block metres away, or look exchanged; the survey knows better."""
+    case = _spoilt(few_rays, seed)
+    assert _off(case, orient(case.network)) < 6.0
 
 
 def test_a_point_that_cannot_be_judged_does_not_bend_the_result() -> None:

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Final
 
 from rig.errors import BadInputError, StorageError, SvevError
-from rig.host.object_store import Options
+from rig.host.object_store import Options, StoreSilentError
 from season.campaign import Campaign
 from season.running.logs import SeasonLog, find_logs, with_outcomes
 from season.running.outcome import LogState, Outcome, decoded
@@ -18,6 +18,8 @@ from season.running.stores import left_behind, read_outcomes
 from season.running.task import give_up, measure
 
 _LOCK: Final = ".lock"
+#: Logs one after the other whose store did not answer, each for a minute: then it will not for the others either.
+_SILENCES: Final = 5
 _LOCK_FLAGS: Final = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
 
@@ -67,6 +69,7 @@ def measure_logs(
     Raises:
         BadInputError: campaign, survey, store or scheduler are wrong.
         ProcessDiedError: the scheduler is gone.
+        StorageError: the store has ceased to answer.
     """
     logs = find_logs(campaign)
     state = SeasonState(campaign.out / NAME, campaign.name, logs)
@@ -108,7 +111,7 @@ class _Hearer:
     ) -> None:
         self.logs, self._options, self._state, self._progress = logs, options, state, progress
         self.outcomes: dict[str, Outcome] = {}
-        self._ended = 0
+        self._ended = self._silences = 0
 
     def started(self, name: str) -> None:
         self._state.run(name)
@@ -130,6 +133,7 @@ class _Hearer:
     def failed(self, name: str, error: BaseException) -> None:
         if isinstance(error, SvevError | OSError):  # perhaps another time
             self._fail(name, str(error))
+            self._refuse_silence(error)
         else:
             why = f"svev failed in it ({type(error).__name__}: {error}): send it to those who make svev"
             self._give_up(name, why)
@@ -148,7 +152,19 @@ class _Hearer:
         else:
             self._settle(name, found)
 
+    def _refuse_silence(self, error: BaseException) -> None:
+        """End the run when the store does not answer for any log.
+
+        Raises:
+            StorageError: it did not for so many, one after the other.
+        """
+        self._silences = self._silences + 1 if isinstance(error, StoreSilentError) else 0
+        if self._silences >= _SILENCES:
+            text = f"{error}; what is measured stays: run the season again when it does"
+            raise StorageError(text) from error
+
     def _settle(self, name: str, outcome: Outcome) -> None:
+        self._silences = 0
         self.outcomes[name] = outcome
         self._state.settle(name, outcome)
         self._tick()

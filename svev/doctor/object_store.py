@@ -10,8 +10,7 @@ from rig.settings.model import RigSettings
 from service.offloading.orders import PROGRAM, TryStore
 from svev.doctor.finding import Finding, Topic, passed, warning
 
-#: A store that has not taken and given back a few bytes by then does not answer, s: its package tries a store that
-#: refuses for about 10 s, and one that is silent for minutes.
+#: A store that has not taken and given back a few bytes by then does not answer, s; copies wait a minute.
 LOOK_S: Final = 30.0
 
 

@@ -14,9 +14,12 @@ from typing import Any
 import pytest
 
 from rig.errors import StorageError
+from rig.host.object_store import StoreSilentError
 from season.campaign import read_campaign
+from season.running.logs import find_logs
 from season.running.outcome import LogState, decoded
-from season.running.run import alone
+from season.running.run import _SILENCES, _Hearer, alone
+from season.running.state import SeasonState
 from season.running.stores import OUTCOME
 from tests.analysis.measured import measured_jump
 from tests.season.files import campaign_file, log_file
@@ -81,6 +84,21 @@ def test_a_link_of_the_name_of_the_lock_is_not_followed(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match="cannot be written"), alone(campaign):
         pass
     assert target.read_text() == "somebody's"
+
+
+def test_a_store_that_falls_silent_ends_the_run(tmp_path: Path) -> None:
+    """Else every log would wait for it."""
+    log = log_file(tmp_path / "hill" / "a.mcap")
+    logs = {each.url: each for each in find_logs(read_campaign(campaign_file(tmp_path)))}
+    hearer = _Hearer(logs, {}, SeasonState(tmp_path / "state.json", "Training", logs.values()), lambda _: None)
+    silence = StoreSilentError("the object store does not answer")
+    for _ in range(_SILENCES - 1):
+        hearer.failed(str(log), silence)
+    hearer.failed(str(log), OSError("damaged"))  # it answers
+    for _ in range(_SILENCES - 1):
+        hearer.failed(str(log), silence)
+    with pytest.raises(StorageError, match=r"does not answer; what is measured stays: run the season again when"):
+        hearer.failed(str(log), silence)
 
 
 @pytest.mark.long

@@ -4,6 +4,7 @@ A log counts as copied when it was read back from the other disk and its checksu
 `sha256sum --check` reads.
 """
 
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -36,6 +37,12 @@ def _copy(asked: Copy, tell: Teller) -> End:
     if not to.is_dir():
         text = "{folder}: the folder for copies is not there; connect its disk, and the copy is made"
         raise StorageError(phrase("copying_no_folder", text, folder=str(to)))
+    if not os.access(to, os.W_OK | os.X_OK):
+        text = (
+            "{folder}: nothing can be written there; mount its disk writable, or give the folder to the user of the "
+            "service (under systemd allow it by ReadWritePaths), and the copy is made"
+        )
+        raise StorageError(phrase("copying_not_writable", text, folder=str(to)))
     wanted = [source for source in asked.paths if source.exists() and not _is_copied(source, to / source.name)]
     size = bytes_of(wanted)
     there = sum(part.stat().st_size for source in wanted if (part := _part(source, to)).is_file())

@@ -21,6 +21,10 @@ from service.offloading.verified_copy import sum_of
 _RULES_LOOK_S: Final = 60.0
 _DAY_S: Final = 86400.0
 _GB: Final = 1e9
+#: A log whose inode changed so long after it was written has come back, from the trash or from its copy.
+_CAME_BACK_S: Final = 60.0
+#: Whoever fetches a recording wants to do something with it: so long no rule takes it.
+_WANTED_S: Final = _DAY_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +51,7 @@ class Releasing:
         notes: what is copied.
         removal: how recordings are removed.
         tell: takes an event for the live log.
+        now: the time, UNIX time, s.
     """
 
     def __init__(
@@ -56,9 +61,10 @@ class Releasing:
         notes: CopyNotes,
         removal: Removal,
         tell: Callable[[Event], None],
+        now: Callable[[], float] = time.time,
     ) -> None:
         self._folder, self._in_use, self._notes = folder, in_use, notes
-        self._removal, self._tell = removal, tell
+        self._removal, self._tell, self._now = removal, tell, now
         self._next_look = time.monotonic()
 
     def next(self) -> tuple[Path, ...] | None:
@@ -109,14 +115,21 @@ class Releasing:
             self._tell(Event.now(Level.INFO, "service", said))
 
     def _let_go(self, offload: OffloadSettings) -> list[tuple[Path, ...]]:
-        """The logs of each recording that the rules let go, the oldest first: by what was written last of it."""
+        """The logs of each recording that the rules let go, the oldest first.
+
+        A recording is as old as what was written last of it, or as its return from the trash or from its copy.
+        """
         times: dict[tuple[Path, ...], float] = {}
+        now = self._now()
         for log in self._folder.glob("*.mcap"):
             logs = parts_of(log)
             try:
-                times[logs] = max(each.stat().st_mtime for each in logs)
+                stats = [each.stat() for each in logs]
             except FileNotFoundError:
                 continue
+            written, placed = max(each.st_mtime for each in stats), max(each.st_ctime for each in stats)
+            if placed - written < _CAME_BACK_S or not 0 <= now - placed < _WANTED_S:
+                times[logs] = max(written, placed)
         found = sorted(times, key=lambda logs: (times[logs], logs[0].name))
         free = free_bytes(self._folder)
         wanted = 0.0 if offload.keep_free_GB is None else offload.keep_free_GB * _GB
@@ -124,7 +137,7 @@ class Releasing:
             return found
         if offload.keep_days is None or not self._removal.clock_is_right():
             return []
-        oldest = time.time() - offload.keep_days * _DAY_S
+        oldest = now - offload.keep_days * _DAY_S
         return [logs for logs in found if times[logs] < oldest]
 
     def _is_safe(self, log: Path, offload: OffloadSettings) -> bool:

@@ -1,6 +1,7 @@
 """A folder on another file system than the tests' folders."""
 
 import os
+import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,3 +17,9 @@ def other_disk() -> Iterator[Path]:
             yield Path(folder)
         finally:
             os.close(held)
+
+
+def may_mount() -> bool:
+    """Whether a program of ours may have mounts of its own."""
+    command = ["unshare", "--mount", "true"]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0

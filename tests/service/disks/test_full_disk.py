@@ -1,6 +1,5 @@
 """A disk that fills up while recording: the recording ends, its log is readable, and the service goes on."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -9,19 +8,15 @@ from recorder.checking.verify import verify
 from tests.capture.rigs import write_rig
 from tests.service.serving import PATIENCE_S, serving
 from tests.support.loopback import Loopback
+from tests.support.other_disk import may_mount
 from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.long
 
 
-def _may_mount() -> bool:
-    command = ["unshare", "--mount", "true"]
-    return subprocess.run(command, capture_output=True, check=False).returncode == 0
-
-
 def test_a_full_disk_ends_the_recording_and_the_service_lives_on(tmp_path: Path, loopback: Loopback) -> None:
     """A disk of 300 MB, mounted in a mount namespace of the service's own."""
-    if not _may_mount():
+    if not may_mount():
         pytest.skip("no mount namespace of our own is allowed here: a small disk cannot be made")
     rig = write_rig(tmp_path, "sim", loopback)
     rig.write_text(rig.read_text().replace("[network]", "[recorder]\nreserve_gb = 0\njump_s = 4\n[network]"))

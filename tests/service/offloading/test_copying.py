@@ -3,6 +3,7 @@
 import hashlib
 import os
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from rig.transport.process_table import Child, ProcessSpec
 from service.offloading import verified_copy
 from service.offloading.orders import Copy
 from service.offloading.verified_copy import copy_file
+from tests.support.other_disk import may_mount
 from tests.support.waiting import wait_until
 
 DATA = np.random.default_rng(3).bytes(9_000_000)
@@ -94,6 +96,19 @@ def test_a_copy_of_an_earlier_version_is_confirmed_and_another_log_refused(place
     assert isinstance(end, Failed)
     assert "is another log of this name" in end.said.text
     assert not (there / "jump.mcap.sha256").exists()
+
+
+@pytest.mark.skipif(not may_mount(), reason="no mount namespace of our own is allowed here: no disk can be read-only")
+def test_a_folder_that_cannot_be_written_is_said_to_be(places: tuple[Path, Path]) -> None:
+    log, there = places
+    program = (
+        "import sys; from pathlib import Path; from tests.service.offloading.test_copying import _copy\n"
+        "print(_copy(Path(sys.argv[1]), to=Path(sys.argv[2])).said.text)"
+    )
+    script = f'mount -t tmpfs -o ro none "{there}" && exec "$0" "$@"'
+    command = ["unshare", "--mount", "sh", "-c", script, sys.executable, "-c", program, str(log), str(there)]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    assert said.startswith(f"{there}: nothing can be written there; mount its disk writable")
 
 
 def test_a_killed_copy_leaves_no_log_and_goes_on(places: tuple[Path, Path]) -> None:

@@ -1,6 +1,7 @@
 """Recordings are released only by a rule, and only when their copy is what was recorded."""
 
 import os
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -23,6 +24,8 @@ from tests.support.other_disk import other_disk
 from tests.support.rigs import SIM
 
 DAY_S = 86400
+#: The inode of a file changes when the test makes it, so the time at which recordings are released is later.
+LATER_S = 50 * DAY_S
 
 
 class Bench:
@@ -43,7 +46,7 @@ class Bench:
 
     def copied(self, log: Path, days: float) -> None:
         """Let a log be so many days old, and copied."""
-        then = time.time() - days * DAY_S
+        then = time.time() + LATER_S - days * DAY_S
         os.utime(log, (then, then))
         mark = mark_of(log)
         assert _copy(Copy(paths=(log,), to=self.to), lambda *_, **__: None) == End()  # type: ignore[arg-type]
@@ -52,11 +55,12 @@ class Bench:
     def log(self, name: str) -> Path:
         return self.folder / f"{name}.mcap"
 
-    def release(self, **rules: Any) -> list[str]:
-        """Release what the rules let go; returns what is left."""
+    def release(self, *, later_s: float = LATER_S, **rules: Any) -> list[str]:
+        """Release what the rules let go so much later; returns what is left."""
         rig = SIM.model_copy(update={"offload": OffloadSettings(to=self.to, **rules)})
         removal = Removal(self.catalogue.delete, lambda: self.catalogue.trash().bytes, lambda: self.clock_is_right)
-        releasing = Releasing(self.folder, lambda: rig, self.notes, removal, self._hear)
+        now = time.time() + later_s
+        releasing = Releasing(self.folder, lambda: rig, self.notes, removal, self._hear, lambda: now)
         while (log := releasing.next()) is not None:
             releasing.release(log, busy=lambda: False, wanted=lambda: True)
         return sorted(path.stem for path in self.folder.glob("*.mcap"))
@@ -98,6 +102,28 @@ def test_room_is_kept_free_by_releasing_the_oldest(bench: Bench, monkeypatch: py
     assert bench.release(keep_free_GB=1.0) == ["new", "old"]
     assert bench.release(keep_free_GB=1.0 + size / 2e9) == ["new"]  # what lies in the trash counts as free
     assert bench.release(keep_free_GB=100.0) == []
+
+
+def _from_the_trash(bench: Bench, log: Path) -> None:
+    bench.catalogue.restore(log.stem)
+
+
+def _from_its_copy(bench: Bench, log: Path) -> None:
+    shutil.copy2(bench.to / log.name, log)
+
+
+@pytest.mark.parametrize("fetch", [_from_the_trash, _from_its_copy])
+def test_what_a_person_has_fetched_stays_for_a_day_and_then_counts_as_new(
+    bench: Bench, fetch: Callable[[Bench, Path], None]
+) -> None:
+    log = bench.log("fetched")
+    write_log(log)
+    bench.copied(log, 90)  # long before its inode changed
+    bench.catalogue.delete(log.stem)
+    fetch(bench, log)
+    assert bench.release(later_s=0.9 * DAY_S, keep_days=0.5, keep_free_GB=1e9) == ["fetched"]
+    assert bench.release(later_s=2 * DAY_S, keep_days=5) == ["fetched"], "it is new"
+    assert bench.release(later_s=6 * DAY_S, keep_days=5) == []
 
 
 def test_a_split_recording_is_released_whole(bench: Bench, tmp_path: Path) -> None:

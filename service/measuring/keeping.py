@@ -31,8 +31,7 @@ def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...], names: Mappi
     Raises:
         OSError: the disk refuses.
     """
-    outcome = Outcome(measured=datetime.now(UTC), version=_VERSION, jumps=jumps, names=dict(names))
-    write_outcome(outcome, made)
+    write_outcome(_outcome(jumps, names), made)
     for path in (*made.iterdir(), made):
         sync(path)
     target, old = measured_path(log), made.with_name(f"{made.name}.old")
@@ -41,6 +40,26 @@ def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...], names: Mappi
     made.rename(target)
     sync(target.parent)
     _remove(old)
+
+
+def keep_own_result(log: Path, jumps: tuple[LastJump, ...], names: Mapping[str, str]) -> None:
+    """Note what stands in a result that a person has written beside a log, so that it is like those of the service.
+
+    Args:
+        log: the log.
+        jumps: main figures.
+        names: the corrections of the session, as `names_of` gave them before.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    folder = measured_path(log)
+    write_outcome(_outcome(jumps, names), folder)
+    os.utime(folder)  # whoever watches the folder of the logs is told, which does not hold of what changes in this one
+
+
+def _outcome(jumps: tuple[LastJump, ...], names: Mapping[str, str]) -> Outcome:
+    return Outcome(measured=datetime.now(UTC), version=_VERSION, jumps=jumps, names=dict(names))
 
 
 def keep_renamed(made: Path, log: Path, names: Mapping[str, str]) -> None:

@@ -1,5 +1,6 @@
 """`svev analyze`: measures the jumps of a recording."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,8 +14,13 @@ from analysis.report.course import course_of
 from analysis.report.figures import five_figures, plus_minus
 from analysis.report.kinogram.earlier import read_earlier
 from analysis.result import file as result_file
+from analysis.worker.findings import summary
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
+from recorder.log.measured_path import measured_path
+from rig.errors import StorageError
 from rig.host.endings import interrupted_by_endings
+from service.measuring.keeping import keep_own_result
+from service.measuring.results import names_of
 from svev import console
 from svev.clock_warning import warn_of_clock
 from svev.commands.logs.contents import AlsoJson, LogPath
@@ -53,6 +59,7 @@ def analyze_command(
 
     The balls in the log's own images and their survey orient the cameras; nothing is to be clicked. The folder gets
     jumper.json and .csv, .c3d and .trc, report.html and the kinogram for the coach, protocol.html for the geodesist.
+    Results in LOG.measured beside the log are listed and found by the service like its own.
 
     Exit codes: 0 measured; 2 bad input; 3 nobody jumps in the log, or the balls do not determine the cameras; 4 the
     adjustment did not converge, or the disk refuses.
@@ -64,6 +71,8 @@ def analyze_command(
     source = read_source(survey, calibration)
     by_hand_only = None if measurements is None else read_measurements(measurements)
     more = None if by_hand is None else read_measurements(by_hand)
+    is_beside = out.resolve() == measured_path(log.resolve())
+    names = names_of(log) if is_beside else {}
     before = [jump for folder in earlier or () for jump in read_earlier(folder)]
     with interrupted_by_endings(), console.steps() as tell:
         try:
@@ -79,12 +88,30 @@ def analyze_command(
             console.complain(f"{log}: the balls do not determine the cameras: {error}")
             raise typer.Exit(NOT_CONVERGED if isinstance(error, NotConvergedError) else NOT_SOLVABLE) from None
         files = write_folder(analysis, log, out, earlier=before, video=video, progress=tell)
+    if is_beside:
+        _note_beside(analysis, log, names)
     for line in _lines(analysis):
         console.say(line, aside=as_json)
     if as_json:
         console.print_json(_summary(analysis, out, files))
     else:
         console.say(f"results in {out}; open {out / 'report.html'}")
+
+
+def _note_beside(analysis: Analysis, log: Path, names: Mapping[str, str]) -> None:
+    """Let the service list and find what was measured, as if it had measured the log itself.
+
+    Raises:
+        StorageError: the disk refuses.
+    """
+    result = analysis.result
+    jumps = tuple(
+        summary(log.stem, result.rate_hz, jump, analysis.perpendicular.get(jump.number)) for jump in result.jumps
+    )
+    try:
+        keep_own_result(log, jumps, names)
+    except OSError as error:
+        raise StorageError(f"{measured_path(log)}: cannot be written ({error.strerror}); run it again") from error
 
 
 def _lines(analysis: Analysis) -> list[str]:

@@ -34,9 +34,9 @@ _COMPARISONS: Final = {
 _ORDERED: Final = (*QUANTITIES, "duration", "date")
 #: `name > value`, `name above value` for what has an order; `name:value`, with a value in quotes where it has blanks.
 _TERM: Final = re.compile(
-    rf"(?P<ordered>{'|'.join(_ORDERED)})\s*(?P<sign>>=|<=|>|<|≥|≤|\s(?:above|over|below|under)\s)\s*(?P<bound>\S+)"
+    rf"(?P<ordered>{'|'.join(_ORDERED)})\s*(?P<sign>>=|<=|>|<|≥|≤|\s(?:above|over|below|under)(?!\S))\s*(?P<bound>\S*)"
     r"|(?P<name>[^\W\d][\w-]*)(?P<equal>[:=])(?P<value>\"[^\"]*\"|\S*)"
-    r"|(?P<foreign>[^\W\d]\w*)\s*(?:>=|<=|>|<|≥|≤)\s*\S+"
+    r"|(?P<foreign>[^\W\d]\w*)\s*(?:>=|<=|>|<|≥|≤)"
     r"|\"(?P<quoted>[^\"]*)\"?|(?P<word>\S+)",
     re.IGNORECASE,
 )
@@ -84,6 +84,8 @@ def understood(text: str) -> Wanted:
         found = term.groupdict()
         if found["ordered"]:
             sign = found["sign"].strip().casefold().replace("≥", ">=").replace("≤", "<=")
+            if not found["bound"]:
+                raise _unfinished(found["ordered"].casefold(), sign)
             _compare(wanted, found["ordered"].casefold(), _COMPARISONS[sign], found["bound"])
         elif found["equal"]:
             _equal(wanted, found["name"].casefold(), found["value"].strip('"'))
@@ -170,6 +172,12 @@ def _days(text: str) -> tuple[datetime, datetime]:
     raise BadInputError(
         phrase("search_date", "date {text} is not understood: write 2026-11-21, 2026-11 or 2026", text=text)
     )
+
+
+def _unfinished(name: str, sign: str) -> BadInputError:
+    bound = "2026-11-21" if name == "date" else "48"
+    text = "{name} {sign} what? write for example {name} {sign} {bound}, or put quotes around words"
+    return BadInputError(phrase("search_unfinished", text, name=name, sign=sign, bound=bound))
 
 
 def _unknown(name: str) -> BadInputError:

@@ -72,6 +72,10 @@ def test_days_months_and_years_are_those_of_this_computer() -> None:
     ("text", "said"),
     [
         ("alpha > x", "write for example alpha > 48"),
+        ("alpha >", r"alpha > what\? write for example alpha > 48"),
+        ("Berg alpha above ", r"alpha above what\?"),
+        ("date >=", "write for example date >= 2026-11-21"),
+        ("gamma >", "behind one of alpha, attack"),
         ("gamma > 3", "behind one of alpha, attack"),
         ("alpha:48", "alpha cannot be compared"),
         ("verdict:fine", "verdict:good"),

@@ -135,6 +135,9 @@ def analyze(
     measurements = Measurements(facts.recording, facts.rate_hz, facts.cameras, tuple(jumps))
     if by_hand is not None:
         measurements = merged(measurements, by_hand)
+    if not measurements.jumps and facts.part.text:
+        text = "{log}: nobody jumps in it, but {part}"
+        raise NoJumpError(phrase("why_no_jump_in_part", text, log=str(log), part=facts.part))
     if not measurements.jumps:
         text = (
             "{log}: nobody jumps in it: no pulse shows markers that move as a jumper does; choose another recording, "

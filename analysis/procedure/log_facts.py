@@ -10,7 +10,7 @@ from analysis.measurements.model import MeasuredCamera
 from recorder.reading.info import LogInfo, imported_in_words, info
 from recorder.reading.parts import RecordingReader
 from rig.errors import BadInputError
-from rig.phrase import Phrase, phrase
+from rig.phrase import NOTHING, Phrase, phrase
 from rig.settings.camera import CameraSettings
 from rig.settings.region import calibration_unfit
 from rig.settings.strict_toml import examine
@@ -31,6 +31,7 @@ class LogFacts:
         columns: first and one past the last column of each camera's block, by name, left to right.
         cameras: image size and exposure time by name.
         messages: what a person should know.
+        part: which part of a recording it is, of which others do not lie beside it; empty text: of none.
     """
 
     path: Path
@@ -40,6 +41,7 @@ class LogFacts:
     columns: Mapping[str, tuple[int, int]]
     cameras: Mapping[str, MeasuredCamera]
     messages: tuple[Phrase, ...]
+    part: Phrase = NOTHING
 
 
 def log_facts(path: Path) -> LogFacts:
@@ -58,7 +60,7 @@ def log_facts(path: Path) -> LogFacts:
     exposures = {str(camera.get("name")): _exposure_us(camera) for camera in told}
     tags = about.first.cameras
     unknown = [tag.name for tag in tags if tag.name not in exposures]
-    messages = []
+    messages = [about.part_said] if about.part_said.text else []
     if unknown:
         text = "exposure time of {cameras} is unknown: taken as {us} us"
         messages.append(phrase("log_exposure", text, cameras=", ".join(unknown), us=_EXPOSURE_US))
@@ -78,7 +80,9 @@ def log_facts(path: Path) -> LogFacts:
     shape = about.first.shape
     cameras = {tag.name: MeasuredCamera(tag.size(shape), exposures.get(tag.name, _EXPOSURE_US) / 1e6) for tag in tags}
     columns = {tag.name: (int(tag.columns[0]), int(tag.columns[1])) for tag in tags}
-    return LogFacts(path, about.recording, about.session, _rate_hz(about), columns, cameras, tuple(messages))
+    return LogFacts(
+        path, about.recording, about.session, _rate_hz(about), columns, cameras, tuple(messages), about.part_said
+    )
 
 
 def _rate_hz(about: LogInfo) -> float:

@@ -57,6 +57,7 @@ SENTENCES: Final = {
     ),
     "jump_too_short": "færre enn {least} pulser har et punkt i to kameraer: ingenting å glatte",
     "jump_contradictory": "målingene motsier hverandre: sjekk kalibreringen og kameranavnene",
+    "why_no_jump_in_part": "{log}: ingen hopper i det, men {part}",
     "why_no_jump": (
         "{log}: ingen hopper i det: ingen puls viser markører som beveger seg slik en hopper gjør; velg et annet "
         "opptak, eller se om innmålingen er i meter med Z opp, og om markørene skiller seg ut"

@@ -21,7 +21,7 @@ from recorder.reading.parts import RecordingReader, missing_after, missing_befor
 from recorder.reading.records import Damage
 from recorder.reading.triplets import health_of, tag_of
 from rig.host.utc_clock import UtcState
-from rig.phrase import Phrase
+from rig.phrase import NOTHING, Phrase, phrase
 from rig.tag import TripletTag
 from rig.topics import (
     COMPACT_METADATA,
@@ -110,6 +110,15 @@ class LogInfo:
     def ended_early(self) -> str:
         """Why the log ends before its recording was to end, in one line; empty: it ended as was wanted."""
         return self.ended_early_said.text
+
+    @property
+    def part_said(self) -> Phrase:
+        """Which part of a recording the log is, of which others do not lie beside it; empty text: of none."""
+        missing = " and ".join(filter(None, (self.part_before, self.part_after)))
+        if not missing:
+            return NOTHING
+        text = "it is part {part} of a recording, and {missing} does not lie beside it: put all parts into one folder"
+        return phrase("log_part", text, part=self.part, missing=missing)
 
     @property
     def recording(self) -> str:

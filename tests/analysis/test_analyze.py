@@ -160,6 +160,12 @@ def test_what_cannot_be_measured_is_said_in_one_line(jump: HillLog, tmp_path: Pa
     out = tmp_path / "out"
     nobody = svev("analyze", empty.path, "--survey", empty.survey, "--out", out, code=3)
     assert "nobody jumps in it" in nobody.stderr
+    first, second = split_log(empty.path, tmp_path / "r1.mcap", (5,))
+    first.unlink()
+    alone = svev("analyze", second, "--survey", empty.survey, "--out", out, code=3)
+    lone = "it is part 2 of a recording, and r1 does not lie beside it: put all parts into one folder"
+    assert f"nobody jumps in it, but {lone}" in alone.stderr
+    assert lone in svev("export", second, "--out", tmp_path / "tags.csv").stderr
     survey = json.loads(jump.survey.read_text())
     survey["cameras"]["K1"]["size"] = [1280, 960]
     wrong = tmp_path / "wrong.json"
@@ -167,7 +173,7 @@ def test_what_cannot_be_measured_is_said_in_one_line(jump: HillLog, tmp_path: Pa
     size = svev("analyze", jump.path, "--survey", wrong, "--out", out, code=2)
     assert "calibrated for images of 1280 x 960 px" in size.stderr
     both = svev("analyze", jump.path, "--survey", jump.survey, "--calibration", wrong, "--out", out, code=2)
-    for done in (nobody, size, both):
+    for done in (nobody, alone, size, both):
         assert len(done.stderr.strip().splitlines()) == 1
         assert done.stderr.startswith("svev: ")
     assert not out.exists()

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from analysis.film.export import export, in_file_name
 from analysis.film.shots import Recording
+from recorder.reading.info import info
 from rig.api.export import ENDINGS, ExportOrder, Kind, Quality
 from rig.api.language import Language
 from rig.errors import BadInputError
@@ -94,6 +95,8 @@ def export_command(
         )
     except ValidationError as error:
         raise BadInputError(f"{error.errors()[0]['loc'][0]}: {error.errors()[0]['msg']}; see --help") from None
+    if part_said := info(log, whole=True).part_said.text:
+        console.say(f"{log}: {part_said}; this one alone is exported", aside=True)
     written: list[Path] = []
     pulses = 0
     parts = _parts(log, order, out, separate=separate)

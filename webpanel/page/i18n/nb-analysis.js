@@ -32,6 +32,7 @@ export const analysis = {
   jump_untold_points: ["{points} oppgis ikke: det som ble målt der, kan være noe annet på hopperen; se på overlegget, og gi markørene mer kontrast"],
   jump_too_short: ["færre enn {least} pulser har et punkt i to kameraer: ingenting å glatte"],
   jump_contradictory: ["målingene motsier hverandre: sjekk kalibreringen og kameranavnene"],
+  why_no_jump_in_part: ["{log}: ingen hopper i det, men {part}"],
   why_no_jump: ["{log}: ingen hopper i det: ingen puls viser markører som beveger seg slik en hopper gjør; velg et annet opptak, eller se om innmålingen er i meter med Z opp, og om markørene skiller seg ut"],
   jump_live: ["målt direkte, i {seen} av {pulses} pulser"],
   jump_live_waits: ["hva som er godt målt, sier loggen"],

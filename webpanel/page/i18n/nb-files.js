@@ -51,6 +51,7 @@ export const files = {
   log_one_pulse: ["{log}: har én puls og sier ikke hvor ofte de kommer; et hopp trenger mange pulser: velg et annet opptak"],
   log_exposure: ["eksponeringstiden til {cameras} er ukjent: den regnes som {us} us"],
   log_imported: ["{imported}. Hvor sent hvert kamera er, vites bare av hopperens egen bevegelse"],
+  log_part: ["det er del {part} av et opptak, og {missing} ligger ikke ved siden av: legg alle delene i én mappe"],
   log_cut_off: ["loggen ble avbrutt eller aldri lukket: det som kan leses, måles; svev recover lager en hel"],
   log_mosaic: ["kameraene har fargefilter: gråverdier er regnet ut av naboene, som gjør kanter bløte; sigmaene til skienes vinkler, mest rullen, er for små"],
   log_unread: ["kan ikke leses fra loggen, som er ødelagt: pulsene {which}; svev verify sier mer"],

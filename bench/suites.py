@@ -32,8 +32,10 @@ from bench.service.listing import run_listing
 from bench.service.training import run_trainings
 from bench.triggering.pairing import pairing_table, run_pairing
 from recorder.publishing.subscriber import free_address
+from rig.each import Each
 
 Suite = Callable[[float, Path], dict[str, Any]]
+SpreadSuite = Callable[[float, Path, Each], dict[str, Any]]
 DrawnSuite = Callable[[int, Path], dict[str, Any]]
 
 
@@ -109,8 +111,8 @@ def _jumps(seconds: float, directory: Path) -> dict[str, Any]:
     return {"cases": cases, "file": str(path), "table": table}
 
 
-def _honesty(seconds: float, directory: Path) -> dict[str, Any]:
-    cases = run_honesty(seconds)
+def _honesty(seconds: float, directory: Path, each: Each) -> dict[str, Any]:
+    cases = run_honesty(seconds, each)
     path = write_results("jump-honesty", cases, directory)
     table = []
     for case in cases:
@@ -207,9 +209,10 @@ SUITES: dict[str, Suite] = {
     "jumps": _jumps,
     "jump-faults": _faults,
     "live": lambda seconds, directory: _timed("live", lambda _: run_live(), seconds, directory),
-    "jump-honesty": _honesty,
     "digitizing": lambda seconds, directory: _timed("digitizing", lambda _: run_digitizing(), seconds, directory),
 }
+#: Suites that go on for some seconds, here or elsewhere.
+SPREAD: dict[str, SpreadSuite] = {"jump-honesty": _honesty}
 #: Suites that draw jumps or networks and the errors of their measurements.
 DRAWN: dict[str, DrawnSuite] = {"smoothing": _smoothing, "jump-repeats": _repeats, "gross-errors": _gross_errors}
 #: Suites that fire a number of simulated pulses.

@@ -46,6 +46,15 @@ class Judged:
             edge = number + float(first["takeoff_pulse"]) - float(first["pulse"])
             self.takeoff.append((jump.takeoff.pulse - edge) / jump.takeoff.sigma_pulses)
 
+    def add(self, other: "Judged") -> None:
+        """Count further jumps, behind those that are counted already."""
+        self.in_sight += other.in_sight
+        self.solved += other.solved
+        self.errors_m += other.errors_m
+        self.takeoff += other.takeoff
+        for key, pairs in other.errors.items():
+            self.errors[key] += pairs
+
     def figures(self) -> dict[str, Any]:
         """Shares, errors, and per part, phase and quantity whether the sigmas hold."""
         honesty = {" ".join(key): _honesty(np.array(pairs)) for key, pairs in sorted(self.errors.items())}

@@ -121,8 +121,8 @@ class StepTwo:
             NotConvergedError: the errors are so large that a sample does not converge.
         """
         problem, truth = self.problem, self.truth
-        xy = problem.xy + problem.sigma * rng.standard_normal((count, *problem.xy.shape))
-        observed = _Observed(xy, rng.standard_normal((count, len(problem.relations))))
+        of_images, of_relations = self.drawn(count, rng)
+        observed = _Observed(problem.xy + problem.sigma * of_images, of_relations)
         parts = (truth.interior, truth.position, truth.rotation, truth.xyz)
         state = State(*(np.tile(part, (count,) + (1,) * part.ndim) for part in parts))
         before, moved = np.zeros((2, count, len(self.sigma)))
@@ -136,6 +136,11 @@ class StepTwo:
             if not len(unsettled):
                 return state
         raise NotConvergedError("a simulated adjustment does not settle; the errors are too large for this network")
+
+    def drawn(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Errors of the observations of so many samples, in units of their sigmas: images, relations."""
+        of_images = rng.standard_normal((count, *self.problem.xy.shape))
+        return of_images, rng.standard_normal((count, len(self.problem.relations)))
 
     def _gauss_newton(self, state: State, observed: _Observed) -> Floats:
         """Steps (samples, u) in the chosen datum."""

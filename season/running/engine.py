@@ -2,22 +2,23 @@
 
 Never more than two tasks per thread are under way, so that the scheduler's memory does not grow with the season, and
 the number of workers never changes (decision 0077). A task whose worker dies is run again when all others are done,
-alone: a worker that dies then dies by it.
+alone: a worker that dies then dies by it. A task counts as running when its worker has begun it.
 """
 
 import logging
 import os
 import time
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import uuid
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from queue import Empty, SimpleQueue
 from typing import Any, Final, Protocol
 
 import dask
 from dask.utils import format_bytes
-from distributed import Client, Future, KilledWorker, LocalCluster, wait
+from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, get_worker, wait
 from distributed.comm.core import CommClosedError
 
 from rig.errors import BadInputError, ProcessDiedError
@@ -47,13 +48,16 @@ class Hearer(Protocol):
     """Is told what becomes of the tasks of a run."""
 
     def started(self, name: str) -> None:
-        """A task is under way, or again."""
+        """A worker has begun a task, or begun it again."""
+
+    def interrupted(self, name: str) -> None:
+        """The worker of a task has died; it waits for another one."""
 
     def waiting(self) -> None:
         """Tasks are under way; called every two seconds or more often."""
 
-    def done(self, name: str) -> None:
-        """A task has ended."""
+    def done(self, name: str, result: Any) -> None:
+        """A task has ended; what it has returned."""
 
     def failed(self, name: str, error: BaseException) -> None:
         """A task has ended by an error."""
@@ -137,54 +141,105 @@ def _away_from_the_present_folder() -> Iterator[None]:
             os.environ[_SAFE_PATH] = before
 
 
-def run_tasks(on: Engine, function: Callable[..., Any], arguments: Mapping[str, Any], hearer: Hearer) -> None:
+def run_tasks(on: Engine, function: Callable[[Any], Any], arguments: Iterable[tuple[str, Any]], hearer: Hearer) -> None:
     """Run a function once for each name, on any worker.
 
     Args:
         on: the cluster.
-        function: to run; what it returns is not fetched.
-        arguments: of the function, by name.
+        function: to run.
+        arguments: names, which differ, and the argument of each; they are asked for one by one, as there is room.
         hearer: is told what becomes of them.
 
     Raises:
         ProcessDiedError: the scheduler is gone, or no worker came back.
     """
     try:
-        suspects = _Run(on, function, arguments, hearer, last=False).all_of(arguments)
-        _Run(on, function, arguments, hearer, last=True).all_of(suspects)
+        suspects = _Run(on, function, hearer, last=False).all_of(arguments)
+        _Run(on, function, hearer, last=True).all_of(suspects)
     except (CommClosedError, OSError) as error:
         raise _gone(str(error)) from error
+
+
+def mapped(on: Engine, function: Callable[[Any], Any], arguments: Iterable[Any]) -> list[Any]:
+    """What `map` gives, computed on any worker.
+
+    Raises:
+        ProcessDiedError: the scheduler is gone, no worker came back, or two workers died of a task.
+        Exception: what the function has raised.
+    """
+    hearer = _Results()
+    run_tasks(on, function, ((str(place), argument) for place, argument in enumerate(arguments)), hearer)
+    return [hearer.found[name] for name in sorted(hearer.found, key=int)]
+
+
+class _Results:
+    """Keeps what tasks return."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, Any] = {}
+
+    def started(self, name: str) -> None:
+        """Nothing is kept."""
+
+    def interrupted(self, name: str) -> None:
+        """Nothing is kept."""
+
+    def waiting(self) -> None:
+        """Nothing is to be done."""
+
+    def done(self, name: str, result: Any) -> None:
+        self.found[name] = result
+
+    def failed(self, name: str, error: BaseException) -> None:  # noqa: ARG002 - as the protocol wants it
+        raise error
+
+    def killed(self, name: str, limit: str) -> None:  # noqa: ARG002 - as the protocol wants it
+        raise ProcessDiedError(f"two workers died of a task: it needs more than {limit} of memory, or crashes svev")
+
+
+def _told(function: Callable[[Any], Any], topic: str, name: str, argument: Any) -> Any:
+    """Tell that a worker has begun a task, and do it."""
+    get_worker().log_event(topic, name)
+    return function(argument)
 
 
 class _Run:
     """Tasks until the last of them has ended.
 
     Args:
-        on, function, arguments, hearer: as `run_tasks`.
+        on, function, hearer: as `run_tasks`.
         last: these tasks have each seen a worker die; they run one at a time, and another death ends them.
     """
 
-    def __init__(
-        self, on: Engine, function: Callable[..., Any], arguments: Mapping[str, Any], hearer: Hearer, *, last: bool
-    ) -> None:
-        self._on, self._function, self._arguments, self._hearer = on, function, arguments, hearer
+    def __init__(self, on: Engine, function: Callable[[Any], Any], hearer: Hearer, *, last: bool) -> None:
+        self._on, self._function, self._hearer = on, function, hearer
         self._last = last
+        self._topic = f"svev-{uuid.uuid4().hex}"
+        self._begun: SimpleQueue[str] = SimpleQueue()
         self._names: dict[Future[Any], str] = {}
-        self._suspects: list[str] = []
+        self._arguments: dict[str, Any] = {}
+        self._suspects: list[tuple[str, Any]] = []
         self._threads, self._counted = 0, -_LOOK_S
 
-    def all_of(self, names: Iterable[str]) -> list[str]:
+    def all_of(self, arguments: Iterable[tuple[str, Any]]) -> list[tuple[str, Any]]:
         """Run these tasks.
 
         Returns:
             Those that saw a worker die.
         """
-        left = deque(names)
-        while left or self._names:
-            while left and len(self._names) < self._room():
-                self._submit(left.popleft())
-            for future in self._ended():
-                self._end(self._names.pop(future), future)
+        left, more = iter(arguments), True
+        self._on.client.subscribe_topic(self._topic, lambda event: self._begun.put(event[1]))
+        try:
+            while more or self._names:
+                while more and len(self._names) < self._room():
+                    name, argument = next(left, (None, None))
+                    more = name is not None
+                    if name is not None:
+                        self._submit(name, argument)
+                for future in self._ended() if self._names or more else ():
+                    self._end(self._names.pop(future), future)
+        finally:
+            self._on.client.unsubscribe_topic(self._topic)
         return self._suspects
 
     def _room(self) -> int:
@@ -195,11 +250,18 @@ class _Run:
             self._threads, self._counted = self._on.threads, now
         return _PER_THREAD * self._threads
 
-    def _submit(self, name: str) -> None:
+    def _submit(self, name: str, argument: Any) -> None:
         # pure=False: a name of its own, else Dask would take the result of an equal task for that of this one.
-        future = self._on.client.submit(self._function, self._arguments[name], pure=False)
-        self._names[future] = name
-        self._hearer.started(name)
+        future = self._on.client.submit(_told, self._function, self._topic, name, argument, pure=False)
+        self._names[future], self._arguments[name] = name, argument
+
+    def _hear(self) -> None:
+        """Tell of the tasks that workers have begun."""
+        with suppress(Empty):
+            while True:
+                name = self._begun.get_nowait()
+                if name in self._arguments:
+                    self._hearer.started(name)
 
     def _ended(self) -> set[Future[Any]]:
         """Wait for the first of the tasks to end.
@@ -211,6 +273,7 @@ class _Run:
             ProcessDiedError: no worker came back.
         """
         for _ in range(_PATIENCE):
+            self._hear()
             self._hearer.waiting()
             if self._names:
                 with suppress(TimeoutError):
@@ -225,20 +288,36 @@ class _Run:
 
     def _end(self, name: str, future: Future[Any]) -> None:
         if future.status == "finished":
-            self._hearer.done(name)
+            try:
+                result = future.result(timeout=_CONNECT_S)
+            except (TimeoutError, KilledWorker, CancelledError):
+                self._names[future] = name  # its worker has died with it: the next look tells more
+                return
+            del self._arguments[name]
+            self._hearer.done(name, result)
         elif future.status == "pending":
             self._names[future] = name  # its worker died with what it had returned, and Dask runs it again
         elif future.status == "lost" and self._on.client.status == "running" and not self._last:
-            self._suspects.append(name)  # likewise, and Dask does not
+            self._suspect(name)  # likewise, and Dask does not
         elif future.status != "error":
             raise _gone(f"a task is {future.status}")
-        elif not isinstance(error := future.exception(timeout=_CONNECT_S), KilledWorker):
+        else:
+            self._end_by(future.exception(timeout=_CONNECT_S), name)
+
+    def _end_by(self, error: BaseException, name: str) -> None:
+        if isinstance(error, KilledWorker) and not (self._last or error.allowed_failures):
+            self._suspect(name)
+            return
+        del self._arguments[name]
+        if not isinstance(error, KilledWorker):
             self._hearer.failed(name, error)
-        elif self._last or error.allowed_failures:  # of another's scheduler, which has tried more often itself
+        else:  # or it is another's scheduler, which has tried more often itself
             limit = format_bytes(error.last_worker.memory_limit) if error.last_worker.memory_limit else "its"
             self._hearer.killed(name, limit)
-        else:
-            self._suspects.append(name)
+
+    def _suspect(self, name: str) -> None:
+        self._suspects.append((name, self._arguments.pop(name)))
+        self._hearer.interrupted(name)
 
 
 def _gone(why: str) -> ProcessDiedError:

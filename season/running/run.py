@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from rig.errors import BadInputError, StorageError, SvevError
 from rig.host.object_store import Options, StoreSilentError
@@ -99,7 +99,7 @@ def _measure(
     with engine(campaign.cluster, dashboard) as on:
         started(len(todo), on.threads, on.dashboard)
         hearer = _Hearer({log.url: log for log in todo}, campaign.store, state, progress)
-        run_tasks(on, partial(measure, options=campaign.store), hearer.logs, hearer)
+        run_tasks(on, partial(measure, options=campaign.store), hearer.logs.items(), hearer)
     return hearer.outcomes
 
 
@@ -116,10 +116,13 @@ class _Hearer:
     def started(self, name: str) -> None:
         self._state.run(name)
 
+    def interrupted(self, name: str) -> None:
+        self._state.wait(name)
+
     def waiting(self) -> None:
         self._state.write_sometimes()
 
-    def done(self, name: str) -> None:
+    def done(self, name: str, result: Any) -> None:  # noqa: ARG002 - the key, which stands beside the log too
         try:
             found = decoded(read_outcomes([name], self._options)[0])
         except BadInputError as error:  # the store does not answer now

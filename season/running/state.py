@@ -73,6 +73,11 @@ class SeasonState:
         self._started[url] = time.monotonic()
         self.write_sometimes()
 
+    def wait(self, url: str) -> None:
+        """A log is no longer being measured, and will be again."""
+        self.logs[url] = StateEntry(state=LogState.WAITING, since=_now())
+        self.write_sometimes()
+
     def settle(self, url: str, outcome: Outcome) -> None:
         """Something has come of a log."""
         self.logs[url] = _settled(outcome)

@@ -8,10 +8,23 @@ from typing import Any
 
 import pytest
 
+from rig.settings.file import CONFIG
 from tests.season.files import campaign_file, log_file
 from tests.support.commands import run_svev
 from tests.support.loopback import Loopback
 from tests.support.waiting import wait_until
+
+#: Prints what is found of jumps here, and on two workers.
+_HONESTY = """
+import json
+from functools import partial
+from bench.analysis.honesty import run_honesty
+from season.campaign import Cluster
+from season.running.engine import engine, mapped
+with engine(Cluster(workers=2), "127.0.0.1:0") as on:
+    for each in (map, partial(mapped, on)):
+        print(json.dumps(run_honesty(0.0, each, surveys=2)))
+"""
 
 
 def run_tiny(folder: Path, names: list[str], timeout_s: float = 60) -> dict[str, Any]:
@@ -46,7 +59,10 @@ def test_a_task_that_kills_two_workers_is_set_aside_and_no_other_is_accused(tmp_
 
 def test_while_no_task_ends_somebody_hears_that_they_run(tmp_path: Path) -> None:
     """So the state of a season is written while long logs are measured."""
-    assert run_tiny(tmp_path, ["patient"])["ended"] == {"patient": "done"}
+    names = [f"patient-{number}" for number in range(4)]
+    found = run_tiny(tmp_path, names)
+    assert found["ended"] == dict.fromkeys(names, "done")
+    assert found["begun_at_first"] == 2, "of four that are given to the workers"
 
 
 def test_workers_start_beside_files_of_the_names_of_modules(tmp_path: Path) -> None:
@@ -70,6 +86,24 @@ def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, loopback: Loo
     done = run_svev("season", "run", str(campaign_file(tmp_path)), "--scheduler", address)
     assert done.returncode == 2
     assert f"{address}: no Dask scheduler answers there" in done.stderr
+
+
+def test_a_simulation_on_many_processors_gives_the_same_figures() -> None:
+    plan = ("plan", str(CONFIG / "networks" / "hill-1.toml"), "--samples", "300", "--json")
+    here, spread = run_svev(*plan), run_svev(*plan, "--workers", "2")
+    assert (here.returncode, spread.returncode) == (0, 0), spread.stderr
+    assert "2 processors; dashboard: http://127.0.0.1:" in spread.stderr
+    assert spread.stdout == here.stdout
+
+
+@pytest.mark.long
+@pytest.mark.timeout(500)
+def test_honesty_on_many_processors_gives_the_same_figures() -> None:
+    done = subprocess.run([sys.executable, "-c", _HONESTY], capture_output=True, text=True, timeout=400, check=False)
+    assert done.returncode == 0, done.stderr
+    here, spread = map(json.loads, done.stdout.splitlines())
+    assert [case["draws"] for case in here] == [2, 2]
+    assert spread == here
 
 
 @pytest.mark.long

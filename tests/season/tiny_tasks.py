@@ -7,6 +7,7 @@ import json
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
 from season.campaign import Cluster
 from season.running.engine import engine, run_tasks
@@ -22,15 +23,19 @@ class Heard:
     def __init__(self, waited: Path) -> None:
         self.waited = waited
         self.ended: dict[str, str] = {}
+        self.begun_at_first = 0
 
-    def started(self, name: str) -> None:
+    def started(self, _: str) -> None:
+        self.begun_at_first += not self.ended
+
+    def interrupted(self, name: str) -> None:
         """Nothing is kept."""
 
     def waiting(self) -> None:
         """What waits for this goes on."""
         self.waited.touch()
 
-    def done(self, name: str) -> None:
+    def done(self, name: str, _: Any) -> None:
         self.ended[name] = "done"
 
     def failed(self, name: str, error: BaseException) -> None:
@@ -62,6 +67,6 @@ def main(folder: str, names: list[str]) -> None:
     heard = Heard(Path(folder) / WAITED)
     with engine(Cluster(workers=2, memory_gb=1.0), "127.0.0.1:0") as on:
         about = {"threads": on.threads, "dashboard": on.dashboard}
-        run_tasks(on, note, {name: Path(folder) / name for name in names}, heard)
+        run_tasks(on, note, ((name, Path(folder) / name) for name in names), heard)
     most_mb = peak_memory_bytes() / 1e6
-    print(json.dumps({**about, "ended": heard.ended, "most_mb": most_mb}))  # noqa: T201 - read by the test
+    print(json.dumps({**about, "ended": heard.ended, "begun_at_first": heard.begun_at_first, "most_mb": most_mb}))  # noqa: T201 - read by the test

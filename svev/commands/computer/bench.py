@@ -5,11 +5,12 @@ from typing import Annotated
 
 import typer
 
-from bench.suites import DRAWN, FIRED, JUMPED, SUITES
+from bench.suites import DRAWN, FIRED, JUMPED, SPREAD, SUITES
 from rig.errors import BadInputError
 from svev import console
+from svev.spreading import SchedulerOption, WorkersOption, spread
 
-_NAMES = (*SUITES, *DRAWN, *FIRED, *JUMPED)
+_NAMES = (*SUITES, *SPREAD, *DRAWN, *FIRED, *JUMPED)
 
 
 def bench(
@@ -36,6 +37,8 @@ def bench(
         Path,
         typer.Option("-o", "--out", metavar="DIR", help="folder for the results, and for logs that are removed again"),
     ] = Path("bench/results"),
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="end with one JSON object")] = False,
 ) -> None:
     """Measure how fast this computer records and computes; each figure stands beside a baseline of the same run.
@@ -50,14 +53,14 @@ def bench(
     planning: intersections of rays and planned networks. adjustment: free networks with full covariance; the baseline
     is scipy's least_squares.
     jumps, jump-faults: rendered jumps are measured, without and with faults. jump-honesty: the same with many drawn
-    surveys, errors beside their sigmas. jump-repeats: one jump filmed again and again, and with another leg angle: how
-    often comparisons find a difference; about seven seconds a draw. live: how soon a worker tells the state of each
-    pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with all measurements and with a marker or a
-    ski missing for a while; about two seconds a draw. gross-errors: hills with exchanged names, wrong survey, wrong
-    image points or wrong units: what the search for gross errors makes of them. pairing: triplets mixed, not found and
-    invented under clocks that are set and rates that the rig file does not name. digitizing: measuring by hand over
-    HTTP with nothing and with 100 000 points marked, from a click to its sigma, from the pointer to the curves, a step
-    to another pulse; processor times beside, which other programs change little.
+    surveys, errors beside their sigmas (alone spread by --workers or --scheduler). jump-repeats: one jump filmed again
+    and again, and with another leg angle: how often comparisons find a difference; about seven seconds a draw. live:
+    how soon a worker tells the state of each pulse at 30 Hz. smoothing: whether the sigmas of smoothed jumps hold, with
+    all measurements and with a marker or a ski missing for a while; about two seconds a draw. gross-errors: hills with
+    exchanged names, wrong survey, wrong image points or wrong units: what the search for gross errors makes of them.
+    pairing: triplets mixed, not found and invented under clocks that are set and rates that the rig file does not name.
+    digitizing: measuring by hand over HTTP with nothing and with 100 000 points marked, from a click to its sigma, from
+    the pointer to the curves, a step to another pulse; processor times beside, which other programs change little.
 
     Example: svev bench saturated --seconds 10
     """
@@ -69,6 +72,9 @@ def bench(
         console.say(f"{name} ...", aside=True)
         if name in SUITES:
             results[name] = SUITES[name](seconds, out)
+        if name in SPREAD:
+            with spread(workers, scheduler) as each:
+                results[name] = SPREAD[name](seconds, out, each)
         for counted, number in ((DRAWN, draws), (FIRED, pulses), (JUMPED, jumpers)):
             if name in counted:
                 results[name] = counted[name](number, out)

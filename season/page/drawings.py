@@ -13,15 +13,17 @@ from season.page.content import Athlete, Drift, Means
 _ROW: Final = 34.0
 _MARGIN: Final = 8.0
 _COLOURS: Final = (Colour.BLUE, Colour.AMBER, Colour.GREEN, Colour.RED, Colour.INK, Colour.SOFT)
+#: Room above and below, of the largest value: the ticks of an axis have four digits then.
+_LEAST: Final = 0.01
 #: Dots above each other, so that equal values are seen.
 _LEVELS: Final = 5
 Link = Callable[[str], str]
 
 
 def span_of(values: Floats) -> tuple[float, float]:
-    """Lowest and highest value, with some room."""
+    """Lowest and highest value, with some room; of values that are nearly equal so much that scales stay short."""
     low, high = float(values.min()), float(values.max())
-    room = 0.04 * (high - low) or 1.0
+    room = max(0.04 * (high - low), _LEAST * max(abs(low), abs(high))) or 1.0
     return low - room, high + room
 
 

@@ -20,7 +20,7 @@ from rig.errors import StorageError
 from rig.host.disk import replace_file
 from season.page.content import Athlete, Content, Quantity, ToLookAt, content_of
 from season.page.drawings import Link, course, drift_chart, hill_chart, scale, span_of, strip
-from season.page.words import said, text
+from season.page.words import counted, said, text
 from season.running.stores import is_remote
 from season.tables.database import opened
 
@@ -81,10 +81,12 @@ def _head(content: Content) -> str:
         for each in LANGUAGES
     )
     switch = f'<fieldset><legend class="unseen">{text("language")}</legend>{choices}</fieldset>'
+    of = {"jumps": "jumps", "athletes": "athletes", "hills": "hills_counted", "days": "days"}
+    counts = {name: counted(key, content.counts[name]) for name, key in of.items()}
     between = "" if content.first is None else text("between", "p", first=content.first, last=content.last)
     return (
         f"<header><div><h1>{escape(content.campaign)}</h1>{switch}</div>"
-        f"{text('counts', 'p', **content.counts)}{between}</header>"
+        f"{text('counts', 'p', **counts)}{between}</header>"
     )
 
 
@@ -137,7 +139,7 @@ def _athlete(athlete: Athlete, name: Said, unit: str, span: tuple[float, float],
     of = {"athlete": who, "quantity": name, "unit": unit}
     return (
         f'<div class="row"><div><strong>{escape(who)}{star}</strong> <span class="number">{shown(figure(mean))}</span> '
-        f"{text('jumps', 'small', count=group.jumps)} {compared}</div>"
+        f"{shown(counted('jumps', group.jumps), 'small')} {compared}</div>"
         f"{strip(athlete, span, link, said('strip', **of).english)}"
         f"{course(athlete, days, span, link, said('course', **of).english)}</div>"
     )

@@ -7,7 +7,15 @@ from analysis.report.language import LANGUAGES, Said, shown
 
 TEXTS: Final = {
     "language": ("Language", "Språk"),
-    "counts": ("{jumps} jumps · {athletes} athletes · {hills} hills · {days} days", "{jumps} hopp · {athletes} utøvere · {hills} bakker · {days} dager"),
+    "counts": ("{jumps} · {athletes} · {hills} · {days}", "{jumps} · {athletes} · {hills} · {days}"),
+    "jumps": ("{count} jumps", "{count} hopp"),
+    "jumps_one": ("{count} jump", "{count} hopp"),
+    "athletes": ("{count} athletes", "{count} utøvere"),
+    "athletes_one": ("{count} athlete", "{count} utøver"),
+    "hills_counted": ("{count} hills", "{count} bakker"),
+    "hills_counted_one": ("{count} hill", "{count} bakke"),
+    "days": ("{count} days", "{count} dager"),
+    "days_one": ("{count} day", "{count} dag"),
     "between": ("{first} to {last}", "{first} til {last}"),
     "nothing": ("No jump is measured yet.", "Ingen hopp er målt ennå."),
     "look": ("Jumps to look at first ({count})", "Hopp å se på først ({count})"),
@@ -19,7 +27,6 @@ TEXTS: Final = {
     "takeoff": ("{quantity} at the take-off", "{quantity} i satsen"),
     "athletes_how": ("From the largest to the smallest mean. Each dot is a good jump and leads to its report; the upright line is the mean, the thick bar twice its standard deviation. On the right the same jumps over the days of jumping: the mean of each day in a band of twice its standard deviation.", "Fra det største til det minste gjennomsnittet. Hver prikk er et godt hopp og fører til rapporten; den loddrette streken er gjennomsnittet, den tykke to standardavvik til hver side. Til høyre de samme hoppene over hoppdagene: dagens gjennomsnitt i et bånd på to standardavvik."),
     "stars_how": ("A star: differs from the others who jumped on the same days on the same hill (t test of the days' differences, at least three days), corrected for how many athletes are compared (false discovery rate): of twenty stars one is expected to be false.", "Stjerne: skiller seg fra de andre som hoppet de samme dagene i samme bakke (t-test av dagenes forskjeller, minst tre dager), korrigert for hvor mange utøvere som sammenlignes: av tjue stjerner ventes én å være falsk."),
-    "jumps": ("{count} jumps", "{count} hopp"),
     "from_others": ("{difference}{unit} from the others, p {p}", "{difference}{unit} fra de andre, p {p}"),
     "no_test": ("not compared: fewer than three days with others", "ikke sammenlignet: færre enn tre dager med andre"),
     "strip": ("{athlete}: jumps over {quantity}, {unit}", "{athlete}: hopp over {quantity}, {unit}"),
@@ -42,6 +49,11 @@ def said(key: str, **values: object) -> Said:
             for place, language in enumerate(LANGUAGES)
         )
     )
+
+
+def counted(key: str, count: int) -> Said:
+    """So many of something."""
+    return said(f"{key}_one" if count == 1 else key, count=count)
 
 
 def text(key: str, tag: str = "span", **values: object) -> str:

@@ -142,7 +142,7 @@ def asked(
         columns = [each[0] for each in answer.description or ()]
         return columns, answer.fetchall()
     except duckdb.Error as error:
-        raise BadInputError(f"{_first_line(error)}; DESCRIBE jumps says which columns there are") from error
+        raise BadInputError(f"{_first_line(error)}; {_remedy(error)}") from error
 
 
 def _fill(
@@ -242,6 +242,18 @@ def _mark_of(path: Path) -> str | None:
 
 def _quoted(path: Path) -> str:
     return str(path).replace("'", "''")
+
+
+def _remedy(error: duckdb.Error) -> str:
+    match error:
+        case duckdb.CatalogException():
+            return "SHOW TABLES says which tables there are"
+        case duckdb.BinderException():
+            return "DESCRIBE jumps says which columns there are"
+        case duckdb.ParserException():
+            return "write one statement of DuckDB's SQL, or ask a ready question by --ask"
+        case _:
+            return "a statement can only read the tables of the season"
 
 
 def _first_line(error: duckdb.Error) -> str:

@@ -4,11 +4,14 @@ import re
 from pathlib import Path
 from urllib.parse import unquote
 
+import numpy as np
 import pytest
 
 from season.campaign import read_campaign
+from season.page.content import Means
+from season.page.drawings import hill_chart
 from season.page.page import write_page
-from season.page.words import TEXTS
+from season.page.words import TEXTS, counted
 from season.running.logs import find_logs
 from season.running.outcome import LogState
 from season.running.task import give_up
@@ -56,6 +59,17 @@ def test_a_season_without_jumps_names_what_was_passed_over(tmp_path: Path) -> No
     assert "No jump is measured yet." in text
     assert "is &lt;damaged&gt;" in text
     assert "a&lt;b&gt;.mcap" in text
+
+
+def test_means_that_are_nearly_equal_have_a_short_scale() -> None:
+    means = Means(np.arange(3.0), np.array([1.65556, 1.65557, 1.65559]), np.full(3, 1e-5))
+    labels = re.findall(r'text-anchor="end"[^>]*>([^<]+)<', hill_chart({"Hill": means}, "", "m", "means"))
+    assert len(labels) > 2
+    assert max(map(len, labels)) <= 5, labels
+
+
+def test_one_of_something_is_said_so() -> None:
+    assert [counted("athletes", count) for count in (1, 2)] == [("1 athlete", "1 utøver"), ("2 athletes", "2 utøvere")]
 
 
 def test_every_text_is_in_both_languages() -> None:

@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -147,6 +148,19 @@ def no_logs(hill: Path, numbers: range) -> None:
             hill / f"2026-12-01T{number // 3600:02}-{number // 60 % 60:02}-{number % 60:02}Z.mcap",
             b"no log %d" % number,
         )
+
+
+@pytest.mark.long
+def test_a_run_that_is_interrupted_says_what_stays(tmp_path: Path) -> None:
+    hill = tmp_path / "hill"
+    no_logs(hill, range(300))
+    command = [sys.executable, "-m", "svev", "season", "run", str(campaign_file(tmp_path)), "--json"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        wait_until(lambda: len(settled(hill)) > 5, "something has come of some logs", 120)
+        process.terminate()
+        said = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert re.search(r"what came of \d+ of 300 logs lies beside them and stays; run the same command again", said)
 
 
 @pytest.mark.long

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import duckdb
 import pandas as pd
 import pytest
 
@@ -31,11 +32,14 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Drawn:
     return season
 
 
-def test_pandas_and_polars_read_the_same(drawn: Drawn) -> None:
+def test_pandas_polars_and_duckdb_read_the_same(drawn: Drawn) -> None:
     for table, rows in (("jumps", 240), ("pulses", 480), ("cameras", 720), ("logs", 240)):
         path = drawn.campaign.out / f"{table}.parquet"
         panda = pd.read_parquet(path)
         # Polars keeps threads and descriptors for as long as the process lives: it gets one of its own.
+        with duckdb.connect() as database:
+            relation = database.read_parquet(str(path))
+            assert (relation.shape, relation.columns) == (panda.shape, list(panda.columns))
         program = f"import json, polars; t = polars.read_parquet({str(path)!r}); print(json.dumps([len(t), t.columns]))"
         polar = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=60, check=True).stdout
         assert [len(panda), list(panda.columns)] == json.loads(polar)
@@ -109,11 +113,24 @@ def test_a_statement_cannot_change_or_read_anything_else(drawn: Drawn, tmp_path:
     with opened(drawn.campaign.out) as database:
         for statement in (
             "DROP TABLE jumps", f"COPY jumps TO '{tmp_path / 'x.csv'}'", "SELECT * FROM read_text('/etc/hostname')",
-            "SET enable_external_access = true", "nonsense",
+            "SET enable_external_access = true",
         ):  # fmt: skip
-            with pytest.raises(BadInputError, match="DESCRIBE jumps"):
+            with pytest.raises(BadInputError, match="can only read the tables of the season"):
                 asked(database, statement)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("statement", "what_to_do"),
+    [
+        ("nonsense", "write one statement of DuckDB's SQL"),
+        ("SELECT alpha FROM jumps", "DESCRIBE jumps"),
+        ("SELECT * FROM flights", "SHOW TABLES"),
+    ],
+)
+def test_a_wrong_statement_is_said_to_be_with_what_to_do(drawn: Drawn, statement: str, what_to_do: str) -> None:
+    with opened(drawn.campaign.out) as database, pytest.raises(BadInputError, match=what_to_do):
+        asked(database, statement)
 
 
 @pytest.mark.parametrize("name", QUESTIONS)

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from rig.errors import BadInputError
+from rig.host.endings import interrupted_by_endings
 from svev import console
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -50,8 +51,8 @@ def run_command(
     The result of a log is written beside it, into a folder with the ending .season. It counts as long as the log, the
     survey and the version of svev are the same, so the same command goes on after any interruption.
 
-    Exit codes: 0 done, also if some logs could not be measured, which are named; 2 bad input; 4 the disk refuses; 6 the
-    Dask scheduler is gone.
+    Exit codes: 0 done, also if some logs could not be measured, which are named; 2 bad input; 4 the disk refuses, or
+    the store has ceased to answer; 6 the Dask scheduler is gone; 130 interrupted.
 
     Example: svev season run season.toml --workers 4
     """
@@ -65,8 +66,12 @@ def run_command(
     cluster = read.cluster.model_copy(update={name: value for name, value in chosen.items() if value is not None})
     read = read.model_copy(update={"cluster": cluster})
     memory = None if cluster.scheduler else f"{cluster.memory_gb:g} GB"
-    with alone(read), _Progress(memory, as_json=as_json) as bar:
-        logs, state = measure_logs(read, again=again, dashboard=dashboard, started=bar.start, progress=bar.tick)
+    with interrupted_by_endings(), alone(read), _Progress(memory, as_json=as_json) as bar:
+        try:
+            logs, state = measure_logs(read, again=again, dashboard=dashboard, started=bar.start, progress=bar.tick)
+        except KeyboardInterrupt:
+            bar.say_what_stays()
+            raise
         bar.close()
         if build(read, logs) or not (read.out / NAME).exists():
             write_page(read.out)
@@ -106,6 +111,7 @@ class _Progress:
         self._as_json = as_json
         self._stack = ExitStack()
         self._tell: Callable[[int], None] | None = None
+        self._logs = self._done = 0
 
     def __enter__(self) -> "_Progress":
         return self
@@ -122,12 +128,20 @@ class _Progress:
         each = f" with at most {self._memory} of memory each" if self._memory else ""
         shown = f"{each}; dashboard: {dashboard}" if dashboard else each
         console.say(f"measuring {logs} logs on {threads} processors{shown}", aside=self._as_json)
+        self._logs = logs
         self._tell = self._stack.enter_context(console.progress("measuring", logs))
 
     def tick(self, done: int) -> None:
         """So many logs are done."""
+        self._done = done
         if self._tell is not None:
             self._tell(done)
+
+    def say_what_stays(self) -> None:
+        """Somebody ends the run before its end."""
+        self.close()
+        stays = f"what came of {self._done} of {self._logs} logs lies beside them and stays"
+        console.say(f"interrupted: {stays}; run the same command again, and it goes on with the others", aside=True)
 
 
 PlaceOption = Annotated[

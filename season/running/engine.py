@@ -322,5 +322,5 @@ class _Run:
 
 def _gone(why: str) -> ProcessDiedError:
     return ProcessDiedError(
-        f"the Dask scheduler or its workers are gone ({why}); run the season again: what is measured stays"
+        f"the Dask scheduler or its workers are gone ({why}); run the command again: a season keeps what is measured"
     )

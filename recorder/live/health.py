@@ -6,11 +6,21 @@ from collections.abc import Sequence
 from itertools import accumulate
 from pathlib import Path
 from statistics import median
-from typing import Any, Final
+from typing import Final
 
 from rig.action import ActionCounts
-from rig.clocks import NS_PER_S, NS_PER_US
-from rig.health import CameraHealth, DiskHealth, Health, Latency
+from rig.clocks import NS_PER_S, NS_PER_US, DecimalNs, HostNs
+from rig.health import (
+    CameraHealth,
+    DiskHealth,
+    Health,
+    Latency,
+    PairingHealth,
+    PrerollHealth,
+    PulsesMade,
+    ToldPulses,
+    WritingHealth,
+)
 from rig.host.disk import free_bytes
 from rig.settings.model import RigSettings
 from rig.transport.ring import CameraRing
@@ -18,6 +28,8 @@ from triggering.pairing.pairer import ClosedPulse
 
 _LATE_PULSES: Final = 30
 _ROOM_S: Final = 1.0
+#: Words of the source of the pulses that wait for the next health record; it has about ten a second.
+_WORDS_KEPT: Final = 100
 #: Upper bounds, s. Fixed, so that figures of different days and machines can be added up.
 _BUCKETS_S: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
@@ -76,6 +88,8 @@ class HealthMonitor:
 
     Attributes:
         latency: times from a triplet's last frame in memory until the triplet is handed on.
+        actions: what each camera has answered to action commands; None: they get none.
+        made: the pulses that a line of the computer has made; None: it makes none.
     """
 
     def __init__(self, rig: RigSettings, rings: Sequence[CameraRing], directory: Path) -> None:
@@ -83,6 +97,14 @@ class HealthMonitor:
         self._frames_before = [ring.counters()["frames"] for ring in rings]
         self._offsets: list[deque[int]] = [deque(maxlen=_LATE_PULSES) for _ in rings]
         self.latency = LatencyHistogram()
+        self.actions: tuple[ActionCounts, ...] | None = None
+        self.made: PulsesMade | None = None
+        self._fired: deque[ToldPulses] | None = None
+
+    def fired(self, told: ToldPulses) -> None:
+        """Keep what the source tells of its pulses for the next record."""
+        self._fired = deque(maxlen=_WORDS_KEPT) if self._fired is None else self._fired
+        self._fired.append(told)
 
     def pulse(self, pulse: ClosedPulse) -> None:
         """Note the cameras' trigger offsets of a decided pulse."""
@@ -94,19 +116,41 @@ class HealthMonitor:
         """Frames that have found no free slot in their camera's ring so far, in all cameras."""
         return sum(ring.counters()["underruns"] for ring in self._rings)
 
-    def record(self, connected: Sequence[bool], actions: Sequence[ActionCounts] | None = None, **others: Any) -> Health:
+    def record(
+        self,
+        now: HostNs,
+        connected: Sequence[bool],
+        *,
+        pairing: PairingHealth,
+        free_triplets: int,
+        unpublished: int,
+        preroll: PrerollHealth,
+        recording: WritingHealth | None,
+    ) -> Health:
         """The record for the second that ends now.
 
         Args:
+            now: present time.
             connected: for each camera, whether it is connected.
-            actions: what each camera has answered to action commands; None: they get none.
-            others: the fields of `rig.health.Health` that other objects measure.
+            pairing: this and the others as in `rig.health.Health`.
+            free_triplets: likewise.
+            unpublished: likewise.
+            preroll: likewise.
+            recording: likewise.
         """
-        answers = [None] * len(connected) if actions is None else actions
-        told = enumerate(zip(connected, answers, strict=True))
-        cameras = tuple(self._camera(index, is_there, counts) for index, (is_there, counts) in told)
-        disk = DiskHealth(self._room.free_bytes)
-        return Health(cameras=cameras, disk=disk, latency=self.latency.figures(), **others)
+        actions = [None] * len(connected) if self.actions is None else self.actions
+        cameras = tuple(map(self._camera, range(len(connected)), connected, actions))
+        fired = None if self._fired is None else tuple(self._fired)
+        if self._fired is not None:
+            self._fired.clear()
+        return Health(
+            cameras, pairing, free_triplets, unpublished, preroll, recording,
+            disk=DiskHealth(self._room.free_bytes),
+            latency=self.latency.figures(),
+            made=self.made,
+            host_time_ns=DecimalNs(now),
+            fired=fired,
+        )  # fmt: skip
 
     def close(self) -> None:
         """End the thread that asks the disk."""

@@ -6,9 +6,11 @@ The commands are `rig.transport.recorder_commands.RecorderCommand`, the reports 
 import os
 import select
 from collections import deque
+from collections.abc import Iterator
 from typing import Final
 
-from recorder.live.assembler import Assembler, Triplet, in_flight_triplets
+from recorder.live.assembler import Assembler, in_flight_triplets
+from recorder.live.composer import Triplet
 from recorder.live.health import HealthMonitor
 from recorder.live.preroll import Preroll, preroll_triplets
 from recorder.live.recordings import Recordings
@@ -16,13 +18,13 @@ from recorder.log.mcap_layout import SlotLayout
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.publishing.keys import check_publication, load_keys
 from recorder.publishing.publisher import Publisher
-from rig.action import ActionCounts
-from rig.clocks import NS_PER_S, DecimalNs, HostNs, host_now
+from rig.clocks import NS_PER_S, HostNs, host_now
 from rig.errors import SvevError
 from rig.events import TRIGGER, Event, Level
-from rig.health import PulsesMade, ToldPulses
+from rig.health import PairingHealth
 from rig.host.utc_clock import SetClock
 from rig.phrase import Phrase, phrase
+from rig.settings.model import RigSettings
 from rig.transport import wire
 from rig.transport.channel import ControlChannel
 from rig.transport.message import Quit
@@ -50,18 +52,64 @@ from rig.transport.recorder_reports import (
 )
 from rig.transport.ring import CameraRing
 from triggering.alarms.notices import SpreadTeller
+from triggering.pairing.pairer import ClosedPulse
 from triggering.sources.choice import trigger_source
 from triggering.timeline.steady_rate import steady_rate
 
 _REPORT_EVERY_NS: Final = NS_PER_S // 5
 _PRESSING_NS: Final = NS_PER_S // 1000
 _WARM_PULSES: Final = 3
-#: Words of the source of the pulses that wait for the next health record; it has about ten a second.
-_WORDS_KEPT: Final = 100
 #: Their rate is measured from so many, and told again; at first from those that there are.
 _RATE_PULSES: Final = 17
 #: How long the recorder waits for the disk when it is told to quit; less than its parent waits for its end.
 _WIND_UP_S: Final = 6.0
+
+
+class _WarmUp:
+    """Whether all cameras see the same pulses, which whole triplets in a row show, and how fast these come."""
+
+    def __init__(self) -> None:
+        self._whole = 0
+        self._times: deque[HostNs] = deque(maxlen=_RATE_PULSES)
+
+    def add(self, pulse: ClosedPulse) -> RecorderWarm | None:
+        """Take in the next pulse; returns what is to be reported, which is seldom anything."""
+        self._whole = self._whole + 1 if pulse.complete else 0
+        self._times.append(pulse.time)
+        if self._whole not in {_WARM_PULSES, _RATE_PULSES}:
+            return None
+        rate = steady_rate(self._times)
+        return RecorderWarm() if rate is None else RecorderWarm(rate_hz=rate.hz, rate_error=rate.error)
+
+
+class _Warnings:
+    """What people are warned of once a second: pulses too far apart, dropped reports, refused subscribers, a set clock.
+
+    Args:
+        rig: the rig.
+        control: channel to the service process.
+        publisher: has the subscribers.
+    """
+
+    def __init__(self, rig: RigSettings, control: ControlChannel[RecorderCommand], publisher: Publisher) -> None:
+        self._control, self._publisher = control, publisher
+        self._spread, self._set_clock = SpreadTeller(trigger_source(rig.trigger)), SetClock()
+        self._unreported = 0
+
+    def due(self, pairing: PairingHealth) -> Iterator[tuple[str, Phrase]]:
+        """What has happened in the last second, each with the name of the part that it concerns."""
+        if (said := self._spread.tell(pairing)) is not None:
+            yield TRIGGER, said
+        dropped, self._unreported = self._control.dropped - self._unreported, self._control.dropped
+        if dropped:
+            why = "{count} reports are dropped: the service process does not read them; see whether it is stopped"
+            yield "recorder", phrase("event_reports_dropped", why, count=dropped)
+        for fault, count in self._publisher.refused().items():
+            what = "{count} connections are closed, of a program that {fault}: end it, or publish on another address"
+            yield "publisher", phrase("event_subscribers_refused", what, count=count, fault=fault)
+        if moved_s := self._set_clock.moved_s():
+            text = "the computer's clock was set by {seconds:+.3f} s, or it was suspended; the times in the log go on"
+            yield "computer", phrase("event_clock_set", text, seconds=moved_s)
 
 
 class RecorderLoop:
@@ -73,55 +121,44 @@ class RecorderLoop:
     """
 
     def __init__(self, config: RecorderConfig, control: ControlChannel[RecorderCommand]) -> None:
-        rig = config.rig
+        rig, network, options = config.rig, config.rig.network, config.options
         rings = [CameraRing(fd) for fd in config.rings]
-        self._rig, self._doorbell, self._control = rig, config.doorbell, control
-        self._preview = None if config.options.preview is None else PreviewSlot(config.options.preview)
+        self._doorbell, self._control = config.doorbell, control
+        self._preview = None if options.preview is None else PreviewSlot(options.preview)
         in_flight, topics = in_flight_triplets(rig), rig.own_topics()
         slot_bytes = SlotLayout(rig.triplet_shape, topics, rig.pixels).slot_bytes
-        held = preroll_triplets(rig, config.options.preroll_s, slot_bytes)
-        self._buffers = TripletBuffers(rig.triplet_shape, in_flight + held, topics, rig.pixels)
-        self._assembler = Assembler(rig, rings, self._buffers, config.epoch)
-        network = rig.network
+        held = preroll_triplets(rig, options.preroll_s, slot_bytes)
+        buffers = TripletBuffers(rig.triplet_shape, in_flight + held, topics, rig.pixels)
+        self._assembler = Assembler(rig, rings, buffers, config.epoch)
         keys = None if network.curve_key_file is None else load_keys(network.curve_key_file)
         self._publisher = Publisher(network.publish, network.publish_ipc, queue=in_flight // 4, keys=keys)
-        self._preroll = Preroll(self._buffers, config.options.preroll_s, held)
-        self._health = HealthMonitor(rig, rings, config.options.directory)
+        self._preroll = Preroll(buffers, options.preroll_s, held)
+        self._health = HealthMonitor(rig, rings, options.directory)
         self._recordings = Recordings(
             self._assembler, self._preroll, self._publisher, self._health.latency, self._health.underruns, self._tell
         )
-        self._quit = False
-        self._warm = self._unreported = 0
-        self._times: deque[HostNs] = deque(maxlen=_RATE_PULSES)
-        self._source = trigger_source(rig.trigger)
-        self._spread = SpreadTeller(self._source)
-        self._set_clock = SetClock()
-        self._actions: tuple[ActionCounts, ...] | None = None
-        self._made: PulsesMade | None = None
-        self._fired: deque[ToldPulses] | None = None
+        self._warm_up, self._warnings = _WarmUp(), _Warnings(rig, control, self._publisher)
         now = host_now()
         self._next_report, self._next_health = now, HostNs(now + NS_PER_S)
 
     def run(self) -> None:
         """Work until told to quit or until the service process is gone; then finish the recording."""
+        rig = self._assembler.rig
         if self._preview is not None:
-            self._preview.take_over(self._rig.triplet_shape)
+            self._preview.take_over(rig.triplet_shape)
         self._tell(RecorderReady())
-        if exposed := check_publication(self._rig.network):
+        if exposed := check_publication(rig.network):
             self._warn("publisher", exposed)
         poll = select.poll()
         poll.register(self._doorbell, select.POLLIN)
         poll.register(self._control, select.POLLIN)
-        for command in self._control.receive(0):  # commands that came together with the configuration ring no bell
-            self._obey(command)
-        while not self._quit:
+        quits = self._obey_waiting()  # commands that came together with the configuration ring no bell
+        while not quits:
             ready = {fd for fd, _ in poll.poll(self._sleep_ms(host_now()))}
             if self._doorbell in ready:
                 os.eventfd_read(self._doorbell)
             if self._control.fileno() in ready:
-                for command in self._control.receive(0):
-                    self._obey(command)
-                self._quit = self._quit or self._control.ended
+                quits = self._obey_waiting() or self._control.ended
             self._step(host_now())
         gone = phrase("why_service_gone", "the service process is gone")
         self._recordings.wind_up(
@@ -129,15 +166,15 @@ class RecorderLoop:
         )
         self._publisher.close()
         self._health.close()
-        self._buffers.close()
+        self._assembler.buffers.close()
 
     def _step(self, now: HostNs) -> None:
         self._control.flush()
         for triplet in self._assembler.pump(now):
             self._take_in(triplet, now)
-        for change in self._assembler.changes():
+        for change in self._assembler.cameras.changes():
             self._camera_changed(change)
-        for limits in self._assembler.limits():
+        for limits in self._assembler.cameras.limits():
             self._tell(limits)
         self._recordings.work(now)
         if now >= self._next_report:
@@ -151,17 +188,20 @@ class RecorderLoop:
         """Measure a decided pulse, show it as preview if one is due, and pass it on to the recordings."""
         self._health.pulse(triplet.pulse)
         if self._preview is not None and self._preview.due(now):
-            pixels = None if triplet.slot is None else self._buffers.pixels(triplet.slot)
+            pixels = None if triplet.slot is None else self._assembler.buffers.pixels(triplet.slot)
             statuses = [outcome.status for outcome in triplet.pulse.outcomes]
-            bits = self._rig.pixels.bits
+            bits = self._assembler.rig.pixels.bits
             self._preview.write(triplet.pulse.number, triplet.pulse.time, statuses, pixels, now, bits)
-        if not self._recordings.running:  # whole triplets show that all cameras see the same pulses
-            self._warm = self._warm + 1 if triplet.pulse.complete else 0
-            self._times.append(triplet.pulse.time)
-            if self._warm in {_WARM_PULSES, _RATE_PULSES}:
-                rate = steady_rate(self._times)
-                self._tell(RecorderWarm() if rate is None else RecorderWarm(rate_hz=rate.hz, rate_error=rate.error))
+        if not self._recordings.running and (warm := self._warm_up.add(triplet.pulse)) is not None:
+            self._tell(warm)
         self._recordings.take(triplet)
+
+    def _obey_waiting(self) -> bool:
+        """Obey the commands that have come; returns whether one says to quit."""
+        commands = self._control.receive(0)
+        for command in commands:
+            self._obey(command)
+        return any(isinstance(command, Quit) for command in commands)
 
     def _obey(self, command: RecorderCommand) -> None:
         match command:
@@ -173,63 +213,43 @@ class RecorderLoop:
             case StopRecording():
                 self._recordings.stop(at_once=command.at_once, keep=command.keep)
             case GrabberDied():
-                self._assembler.disconnected(command.camera, command.reason, host_now())
+                self._assembler.cameras.disconnected(command.camera, command.reason, host_now())
             case TellEvent():
                 self._recordings.happened(command.event)
             case PulsesFired():
                 for number, time in enumerate(command.times, start=command.first):
                     self._assembler.pairer.fired(number, time, command.uncertainty_ns)
                 self._assembler.pairer.fired_until(command.until)
-                self._fired = deque(maxlen=_WORDS_KEPT) if self._fired is None else self._fired
-                self._fired.append(command.told())
+                self._health.fired(command.told())
             case TellResult():
                 self._recordings.result(command)
             case TellActions():
-                self._actions = command.counts
+                self._health.actions = command.counts
             case TellPulses():
-                self._made = command.made
+                self._health.made = command.made
             case Quit():
-                self._quit = True
+                pass
 
     def _camera_changed(self, change: CameraChanged) -> None:
         self._tell(change)
-        name = self._rig.cameras[change.camera].name
+        name = self._assembler.rig.cameras[change.camera].name
         self._recordings.happened(change.event(name))
 
     def _tell_health(self, now: HostNs) -> None:
         """Report, publish and write the health record of the last second."""
         health = self._health.record(
-            self._assembler.connected,
-            self._actions,
-            made=self._made,
-            host_time_ns=DecimalNs(now),
-            fired=None if self._fired is None else tuple(self._fired),
+            now,
+            self._assembler.cameras.connected,
             pairing=self._assembler.pairer.health(),
-            free_triplets=self._buffers.free_count,
+            free_triplets=self._assembler.buffers.free_count,
             unpublished=self._publisher.dropped,
             preroll=self._preroll.health(now),
             recording=self._recordings.statistics(),
         )
-        if self._fired is not None:
-            self._fired.clear()
         self._tell(RecorderHealth(health=health))
-        if (said := self._spread.tell(health.pairing)) is not None:
-            self._warn(TRIGGER, said)
-        self._own_up()
-        if moved_s := self._set_clock.moved_s():
-            text = "the computer's clock was set by {seconds:+.3f} s, or it was suspended; the times in the log go on"
-            self._warn("computer", phrase("event_clock_set", text, seconds=moved_s))
+        for name, said in self._warnings.due(health.pairing):
+            self._warn(name, said)
         self._recordings.health(wire.encode(health))
-
-    def _own_up(self) -> None:
-        """Tell of reports that were dropped because the service does not read, and of refused subscribers."""
-        dropped, self._unreported = self._control.dropped - self._unreported, self._control.dropped
-        if dropped:
-            why = "{count} reports are dropped: the service process does not read them; see whether it is stopped"
-            self._warn("recorder", phrase("event_reports_dropped", why, count=dropped))
-        for fault, count in self._publisher.refused().items():
-            what = "{count} connections are closed, of a program that {fault}: end it, or publish on another address"
-            self._warn("publisher", phrase("event_subscribers_refused", what, count=count, fault=fault))
 
     def _warn(self, name: str, said: Phrase) -> None:
         """Tell people at once, and write it into the log."""

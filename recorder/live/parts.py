@@ -36,9 +36,9 @@ class _Account:
 
     @classmethod
     def of(cls, log: Recording) -> "_Account":
-        gone = log.failure if isinstance(log.failure, FileVanishedError) else None
-        trouble = "" if log.trouble is None else str(log.trouble)
-        return cls(log.part(), log.ledger.first_time, log.ledger.pauses(), log.is_there, gone, trouble)
+        gone = log.ending.failure if isinstance(log.ending.failure, FileVanishedError) else None
+        trouble = "" if log.ending.trouble is None else str(log.ending.trouble)
+        return cls(log.part(), log.account.ledger.first_time, log.account.ledger.pauses(), log.is_there, gone, trouble)
 
 
 class Parts:
@@ -78,7 +78,7 @@ class Parts:
         """Account for what is in the files by now; keep of a log that is closed only its account."""
         for each in self.earlier:
             each.confirm(now)
-        while self.earlier and self.earlier[0].settled and (self.earlier[0].next_part or len(self.earlier) > 1):
+        while self.earlier and self.earlier[0].settled and (self.earlier[0].ending.next_part or len(self.earlier) > 1):
             self._closed.append(_Account.of(self.earlier.pop(0)))
 
     def progress(self, present: Recording) -> RecordingProgress:
@@ -111,7 +111,7 @@ class Parts:
     def turn_over(self, present: Recording, following: Recording) -> None:
         """Begin the next part, and close the present log, all pulses of which are in the file."""
         following.follow(present)
-        present.next_part = following.path.stem
+        present.ending.next_part = following.path.stem
         self.earlier.append(present)
         self._following, self._refused_s, self._refused_bytes = None, 0.0, 0
         present.begin_close()
@@ -125,7 +125,7 @@ class Parts:
     def drop_following(self) -> None:
         """Remove the log of a next part that no pulse came for."""
         if self._following is not None:
-            self._removing, self._following = self._following.discard(), None
+            self._removing, self._following = self._following.opening.discard(), None
 
     def _is_full(self, present: Recording, time: HostNs, ahead_s: float) -> bool:
         """Whether a log is as large as a part may be at a time, or `ahead_s` later."""
@@ -174,8 +174,8 @@ class Parts:
         last.confirm(host_now())
         for each in (last, *self.earlier):
             each.release()
-        if last.failure is None:
-            last.failure = last.unclosed()
+        if last.ending.failure is None:
+            last.ending.failure = last.opening.unclosed()
 
     def finished(self, last: Recording, unpublished: int) -> RecordingFinished:
         """Forget all logs.
@@ -190,7 +190,7 @@ class Parts:
         for each in (last, *self.earlier):
             each.forget()
         *before, end = self._accounts(last)
-        failure = last.failure or next((each.gone for each in before if each.gone is not None), None)
+        failure = last.ending.failure or next((each.gone for each in before if each.gone is not None), None)
         told = self.progress(last)
         report = RecordingFinished(
             path=last.path,

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from recorder.live.assembler import Triplet
+from recorder.live.composer import Triplet
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import NS_PER_S, HostNs
 from rig.events import Event

@@ -35,7 +35,7 @@ class PulseWriter:
 
     def lags(self, recording: Recording, held: Held, now: HostNs) -> bool:
         """Whether to pause the pre-roll, since subscribers would miss pulses that come faster than they take them."""
-        if held.triplet.pulse.time >= recording.commanded or now > recording.commanded + _PATIENCE_NS:
+        if held.triplet.pulse.time >= recording.span.commanded or now > recording.span.commanded + _PATIENCE_NS:
             return False
         in_flight = self._buffers.count - self._preroll.triplets
         # No pause once half of the buffers for new frames are taken: subscribers may be slower than the cameras.
@@ -60,7 +60,7 @@ class PulseWriter:
         finally:
             if black is not None:
                 self._buffers.release(black)
-            if pulse.time >= recording.commanded:
+            if pulse.time >= recording.span.commanded:
                 self.note_latency(pulse, host_now())
 
     def note_latency(self, pulse: ClosedPulse, now: HostNs) -> None:

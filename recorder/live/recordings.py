@@ -18,7 +18,8 @@ from enum import Enum, auto
 from typing import Final
 
 from recorder.live import wording
-from recorder.live.assembler import Assembler, Triplet
+from recorder.live.assembler import Assembler
+from recorder.live.composer import Triplet
 from recorder.live.disk_watch import DiskWatch, hung, too_full
 from recorder.live.health import LatencyHistogram
 from recorder.live.parts import Parts
@@ -80,7 +81,7 @@ class Recordings:
         underruns: Callable[[], int],
         report: Callable[[RecorderReport], None],
     ) -> None:
-        self._assembler, self._buffers, self._preroll = assembler, assembler.buffers, preroll
+        self._assembler, self._preroll = assembler, preroll
         self._publisher, self._report, self._underruns = publisher, report, underruns
         self._writer = PulseWriter(assembler.buffers, preroll, publisher, latency)
         self._recording: Recording | None = None
@@ -148,7 +149,7 @@ class Recordings:
         self._parts.settle(now)
         if recording is not None:
             recording.confirm(now)
-            recording.forget(least_free=self._buffers.count - self._preroll.triplets)
+            recording.forget(least_free=self._assembler.buffers.count - self._preroll.triplets)
             writing = self._phase in {_Phase.RUNNING, _Phase.FLUSHING}
             if writing and recording.log is not None and recording.log.error is not None:
                 self._fail(recording, recording.log.error)
@@ -231,7 +232,7 @@ class Recordings:
                 self._look_at_disk(now)
                 if self._recording is recording and recording.all_written:
                     recording.end_account()
-                    counts = recording.ledger.summary_line()
+                    counts = recording.account.ledger.summary_line()
                     said = phrase("event_log_stopped", "recording stopped: {counts}", counts=counts)
                     self.happened(Event.now(Level.INFO, "recorder", said))
                     self._close(recording, now, _CLOSE_NS)
@@ -241,9 +242,9 @@ class Recordings:
 
     def _await_opened(self, recording: Recording, now: HostNs) -> None:
         try:
-            if recording.opened():
+            if recording.opening.opened():
                 self._opened(recording)
-            elif recording.opening_s(now) > _OPEN_S:
+            elif recording.opening.takes_s(now) > _OPEN_S:
                 self._give_up(recording, wording.not_made(recording.path.parent, _OPEN_S), may_continue=True)
         except SvevError as error:
             self._fail(recording, error)
@@ -257,37 +258,41 @@ class Recordings:
             before = self._parts.earlier[-1]
             said = (
                 wording.next_part(recording.id, recording.path)
-                if before.next_part
-                else wording.goes_on(before.path.stem, recording.path.stem, before.failure)
+                if before.ending.next_part
+                else wording.goes_on(before.path.stem, recording.path.stem, before.ending.failure)
             )
             self._report(RecordingContinued(path=recording.path, before=before.part()))
         else:
             if recording.continues:
                 said = wording.goes_on(recording.continues, recording.id, None)
-            first = self._preroll.first_since(recording.begin)
+            first = self._preroll.first_since(recording.span.begin)
             self._report(RecordingStarted(first_pulse=None if first is None else recording.utc(first)))
-        for time_, note in self._preroll.take_notes(since=recording.begin):
+        for time_, note in self._preroll.take_notes(since=recording.span.begin):
             self._note(note, time_)
         self.happened(Event.now(Level.INFO, "recorder", said))
 
     def _close(self, recording: Recording, now: HostNs, patience_ns: int) -> None:
-        recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
+        self._note_trouble(recording)
         self._parts.drop_following()
         if self._recording is recording:
             self._phase, self._closing_until = _Phase.CLOSING, HostNs(now + patience_ns)
             recording.begin_close()
 
+    def _note_trouble(self, recording: Recording) -> None:
+        """Note in a log that ends what its disk cost."""
+        recording.ending.trouble = self._watch.trouble(recording.account.ledger.causes[FrameStatus.LOST])
+
     def _finish(self, recording: Recording) -> None:
         """Report the end of the recording."""
         self._recording = None
         self._parts.let_go(recording)
-        if recording.mishap and recording.failure is None:
+        if recording.mishap and recording.ending.failure is None:
             self._preroll.put_back(recording.take_kept())
         self._report(self._parts.finished(recording, self._publisher.dropped))
 
     def _give_up(self, recording: Recording, error: StorageError, *, may_continue: bool) -> None:
         """End a log whose disk hangs, without waiting for the disk."""
-        recording.give_up(error)
+        recording.opening.give_up(error)
         self._fail(recording, error, may_continue=may_continue, patience_ns=0)
 
     def _fail(
@@ -308,21 +313,21 @@ class Recordings:
             whole: the log still takes what was handed to it.
             patience_ns: how long to wait until the log is closed.
         """
-        recording.failure = error if isinstance(error, StorageError) else None
-        recording.early = error.said
+        recording.ending.failure = error if isinstance(error, StorageError) else None
+        recording.ending.early = error.said
         recording.mishap = False
         recording.forget()
         taken = isinstance(error, NameTakenError)  # the service orders the recording again under another name
         event = Event.now(Level.WARNING if taken else Level.FATAL, "recorder", error.said)
         self._publisher.event(recording.dated(event, host_now()))
-        recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
+        self._note_trouble(recording)
         self._parts.drop_following()
         if not whole:
             self._preroll.put_back(recording.take_back())
         path = self._parts.next_path(recording, error) if may_continue else None
         if path is not None:
-            recording.early = wording.goes_on_in(path, error)
-            event = Event.now(Level.ERROR, "disk", recording.early)
+            recording.ending.early = wording.goes_on_in(path, error)
+            event = Event.now(Level.ERROR, "disk", recording.ending.early)
             self._report(RecorderEvent(event=event))
             self._parts.earlier.append(recording)
             recording.begin_close()
@@ -393,9 +398,9 @@ class Recordings:
         self._behind = False
         while self._recording is recording and self._phase is _Phase.RUNNING:
             held = self._preroll.oldest
-            if held is None or recording.is_over(held.triplet.pulse):
+            if held is None or recording.span.ends_before(held.triplet.pulse):
                 return
-            if held.triplet.pulse.time < recording.begin:
+            if held.triplet.pulse.time < recording.span.begin:
                 self._preroll.drop()
                 continue
             now = host_now()
@@ -415,7 +420,7 @@ class Recordings:
         if following is None:
             return False
         try:
-            if not following.opened():
+            if not following.opening.opened():
                 return False
         except SvevError as error:
             self._parts.refuse(recording, time_, error)
@@ -424,7 +429,7 @@ class Recordings:
             self._report(RecorderEvent(event=event))
             return self._recording is not recording
         if recording.all_written:
-            recording.trouble = self._watch.trouble(recording.ledger.causes[FrameStatus.LOST])
+            self._note_trouble(recording)
             self._parts.turn_over(recording, following)
             self._begin(following)
             self._opened(following)

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from recorder.live.assembler import Assembler, Triplet, least_buffers
+from recorder.live.assembler import Assembler, least_buffers
+from recorder.live.composer import Triplet
+from recorder.live.tagging import Tagger
 from recorder.log.triplet_buffers import TripletBuffers
 from rig.clocks import HostNs, UtcAnchor, host_now
 from rig.frame import FrameStatus
@@ -48,7 +50,7 @@ def test_frames_stand_side_by_side_in_the_rigs_order(parts: Parts) -> None:
     (triplet,) = assembler.pump(_now(1.3))
     assert _blocks(buffers, triplet) == [{10}, {11}, {12}]
     assert all(ring.counters()["slots_queued"] == 0 for ring in cameras.rings)
-    tags = assembler.camera_tags(triplet.pulse, UtcAnchor(0))
+    tags = list(Tagger(assembler.rig, UtcAnchor(0), "", "").camera_tags(triplet.pulse))
     assert [(tag.columns, tag.status) for tag in tags] == [
         ((0, 40), FrameStatus.OK), ((40, 104), FrameStatus.OK), ((104, 120), FrameStatus.OK),
     ]  # fmt: skip
@@ -57,11 +59,11 @@ def test_frames_stand_side_by_side_in_the_rigs_order(parts: Parts) -> None:
 
 def test_only_a_camera_that_was_there_can_be_gone(parts: Parts) -> None:
     assembler, cameras, _ = parts
-    assembler.disconnected(1, plain("does not answer"), _now(0))
+    assembler.cameras.disconnected(1, plain("does not answer"), _now(0))
     cameras.expose(1, 0)
     list(assembler.pump(_now(1.3)))
-    assembler.disconnected(0, plain("unplugged"), _now(2))
-    told = [(change.camera, change.news, change.event("K").message) for change in assembler.changes()]
+    assembler.cameras.disconnected(0, plain("unplugged"), _now(2))
+    told = [(change.camera, change.news, change.event("K").message) for change in assembler.cameras.changes()]
     assert (1, CameraNews.ABSENT, "absent: does not answer") in told
     assert told[-1] == (0, CameraNews.GONE, "gone: unplugged")
 
@@ -201,8 +203,8 @@ def test_a_recorder_that_takes_anothers_place_goes_on_with_its_cameras() -> None
         buffers = TripletBuffers(rig.triplet_shape, 4)
         anew = Assembler(rig, rings, buffers)
         anew.pump(cameras.time(3.4))
-        assert [change.news for change in anew.changes()] == [CameraNews.CONNECTED] * 3
-        assert anew.connected == [True] * 3
+        assert [change.news for change in anew.cameras.changes()] == [CameraNews.CONNECTED] * 3
+        assert anew.cameras.connected == [True] * 3
         cameras.latch()
         cameras.expose(4, 0, 1, 2)
         (triplet,) = anew.pump(cameras.time(4.3))

@@ -23,15 +23,17 @@ from recorder.live.assembler import Assembler
 from recorder.live.health import LatencyHistogram
 from recorder.live.preroll import Preroll, preroll_triplets
 from recorder.live.recordings import Recordings
+from recorder.log.extent import FORGOTTEN
 from recorder.log.triplet_buffers import TripletBuffers
 from recorder.publishing.publisher import Publisher
 from recorder.reading.log_reader import LogReader
 from recorder.reading.triplets import triplets
 from rig.clocks import NS_PER_S, HostNs, UtcNs
-from rig.errors import StorageError
+from rig.errors import FileVanishedError, StorageError
 from rig.events import Event, Level
 from rig.frame import FrameStatus
 from rig.phrase import plain
+from rig.topics import RECORDING_METADATA
 from rig.transport.recorder_commands import StartRecording
 from rig.transport.recorder_reports import RecorderReport, RecordingFinished, RecordingStarted
 from tests.recorder.live.ring_cameras import PERIOD, SIZES, START, RingCameras, camera_rings, grey, ring_rig
@@ -93,6 +95,7 @@ class Recorder:
         pulses: int | None = None,
         seconds: float | None = None,
         keep_s: float = 0.0,
+        nobody_stops: bool = False,
     ) -> Path:
         """Start a recording into a log of its own."""
         path = self.path / f"{next(self.logs)}.mcap"
@@ -104,6 +107,7 @@ class Recorder:
                 seconds=seconds,
                 preroll_s=preroll_s,
                 keep_s=keep_s,
+                nobody_stops=nobody_stops,
             )
         )
         before, now = len(self.reports), HostNs(self.clock.time)  # no time passes while the log is opened
@@ -346,6 +350,22 @@ def test_a_failing_disk_leaves_the_rest_of_the_past_for_another_try(tmp_path: Pa
         path = recorder.start(None, seconds=0)
         recorder.finish()
     assert _pulses(path) == list(range(failed.counts.pulses + 1, 81))
+
+
+def test_a_recording_that_somebody_has_stopped_is_forgotten_in_no_log(tmp_path: Path, publisher: Publisher) -> None:
+    """Its file vanishes just after the stop, and the rest goes into another log."""
+    with _recorder(tmp_path, publisher, seconds=10.0, limit=100) as recorder:
+        _expose(recorder, 1, 20)
+        first = recorder.start(None, seconds=100.0, nobody_stops=True)
+        recording = recorder.recordings._recording
+        assert recording is not None
+        recorder.recordings.stop()
+        recording.opening.give_up(FileVanishedError("it was deleted: record again"))
+        report = recorder.finish()
+    assert report.path != first
+    with LogReader(report.path) as reader:
+        assert list(reader.items())
+        assert FORGOTTEN not in reader.metadata[RECORDING_METADATA]
 
 
 @pytest.mark.parametrize(("limit", "first"), [(100, 14), (8, 51)])

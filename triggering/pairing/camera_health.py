@@ -51,13 +51,14 @@ def source_health(fired: FiredPulses, last: HostNs | None) -> SourcePairing | No
     """
     if not fired.active:
         return None
+    counts = fired.counts
     return SourcePairing(
-        fired=fired.reported,
-        unseen=fired.unseen,
-        untagged=fired.untagged,
-        unfired=fired.unfired,
+        fired=counts.reported,
+        unseen=counts.unseen,
+        untagged=counts.untagged,
+        unfired=counts.unfired,
         period_us=None if fired.period_ns is None else round(fired.period_ns / 1000, 3),
-        uncertainty_us=fired.uncertainty_ns / 1000,
-        unseen_lately=fired.unseen_at is not None and is_recent(fired.unseen_at, last),
-        unfired_lately=fired.unfired_at is not None and is_recent(fired.unfired_at, last),
+        uncertainty_us=counts.uncertainty_ns / 1000,
+        unseen_lately=counts.unseen_at is not None and is_recent(counts.unseen_at, last),
+        unfired_lately=counts.unfired_at is not None and is_recent(counts.unfired_at, last),
     )

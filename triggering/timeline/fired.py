@@ -10,6 +10,7 @@ is no report, or no exact one, are not judged.
 """
 
 from collections import deque
+from dataclasses import dataclass
 from typing import Final
 
 from rig.clocks import NS_PER_S, HostNs
@@ -28,11 +29,9 @@ _SHARE: Final = 0.5
 _GAP_PERIODS: Final = 1.5
 
 
-class FiredPulses:
-    """Compares the pulses of the source with the decided ones; times are on the common time line.
-
-    Args:
-        train: the rhythm of the decided pulses.
+@dataclass(slots=True)
+class FiredCounts:
+    """What the comparison has shown so far.
 
     Attributes:
         reported: pulses that the source has reported.
@@ -43,34 +42,87 @@ class FiredPulses:
         uncertainty_ns: largest error of the last pulse's time.
     """
 
+    reported: int = 0
+    unseen: int = 0
+    untagged: int = 0
+    unfired: int = 0
+    unseen_at: HostNs | None = None
+    unfired_at: HostNs | None = None
+    uncertainty_ns: int = 0
+
+
+class _Reports:
+    """The reports of the source, as it numbers its pulses.
+
+    Attributes:
+        intervals: the last two times between pulses whose numbers follow on one another.
+    """
+
+    def __init__(self) -> None:
+        self.intervals: deque[int] = deque(maxlen=2)
+        self._last: tuple[int, HostNs] | None = None
+
+    def add(self, number: int, time: HostNs) -> bool:
+        """Enter a pulse; returns whether its number follows on the last one: none in between was left out."""
+        last, self._last = self._last, (number, time)
+        if last is None or number != last[0] + 1:
+            return False
+        self.intervals.append(time - last[1])
+        return True
+
+    def interrupt(self) -> None:
+        """Let the next number follow on none."""
+        self._last = None
+
+
+class _Offset:
+    """By how much the times of the cameras' pulses are later than those of the source."""
+
+    def __init__(self) -> None:
+        self._differences: deque[int] = deque(maxlen=_DIFFERENCES)
+        self._ns = 0
+
+    def learn(self, difference_ns: int) -> None:
+        """Enter the difference of a pulse that source and cameras have."""
+        self._differences.append(difference_ns)
+        self._ns = sorted(self._differences)[len(self._differences) // 2]
+
+    def on_line(self, time: HostNs) -> float:
+        """A time of the source on the common time line."""
+        return time + self._ns
+
+
+class FiredPulses:
+    """Compares the pulses of the source with the decided ones; times are on the common time line.
+
+    Args:
+        train: the rhythm of the decided pulses.
+
+    Attributes:
+        counts: what the comparison has shown so far.
+    """
+
     def __init__(self, train: PulseTrain) -> None:
         self._train = train
         self._queue: deque[HostNs] = deque()
         self._decided: deque[HostNs] = deque(maxlen=_WAITING)
-        self._number: int | None = None
-        self._last: HostNs | None = None
         self._until: HostNs | None = None
         self._since = 0.0  # the source has left out reports before this
         self._trusted = False
         self._first: HostNs | None = None  # of the decided pulses
-        self._intervals: deque[int] = deque(maxlen=2)
         self._before: HostNs | None = None  # the last decided pulse when the reports began
-        self._differences: deque[int] = deque(maxlen=_DIFFERENCES)
-        self._offset_ns = 0
-        self.reported = self.unseen = self.untagged = self.unfired = 0
-        self.uncertainty_ns = 0
-        self.unseen_at: HostNs | None = None
-        self.unfired_at: HostNs | None = None
+        self._reports, self._offset, self.counts = _Reports(), _Offset(), FiredCounts()
 
     @property
     def period_ns(self) -> float | None:
         """Time between the last two pulses by the source's clock; None: it has not reported two."""
-        return float(self._intervals[-1]) if self._intervals else None
+        intervals = self._reports.intervals
+        return float(intervals[-1]) if intervals else None
 
     @property
     def oldest(self) -> HostNs | None:
         """Time of the first pulse of the source that is not decided; None: there is none."""
-        return HostNs(round(self._on_line(self._queue[0]))) if self._queue else None
+        return HostNs(round(self._offset.on_line(self._queue[0]))) if self._queue else None
 
     @property
     def active(self) -> bool:
@@ -85,17 +137,14 @@ class FiredPulses:
             time: when it fired.
             uncertainty_ns: largest error of the time.
         """
-        self.reported += 1
-        self.uncertainty_ns = uncertainty_ns
-        follows = self._number is not None and number == self._number + 1 and self._last is not None
-        if follows and self._last is not None:
-            self._intervals.append(time - self._last)
-        self._number, self._last = number, time
-        reach, place = self._reach_ns, self._on_line(time)
+        self.counts.reported += 1
+        self.counts.uncertainty_ns = uncertainty_ns
+        follows = self._reports.add(number, time)
+        reach, place = self._reach_ns, self._offset.on_line(time)
         self._trusted = uncertainty_ns <= _SHARE * reach
         if not self._trusted:
             self._decided.clear()
-            self._number = None  # the source has not left out the cameras' pulse at this time
+            self._reports.interrupt()  # the source has not left out the cameras' pulse at this time
             return
         if self._until is None:
             self._until = time
@@ -106,7 +155,7 @@ class FiredPulses:
         while self._decided and self._decided[0] < place - reach:
             self._decided.popleft()  # there is no report for that time
         if self._decided and self._decided[0] <= place + reach:
-            self._learn(self._decided.popleft() - time)
+            self._offset.learn(self._decided.popleft() - time)
         elif self._train.last is not None and place <= self._train.last + reach:
             self._pass_over(time)
         else:
@@ -116,11 +165,11 @@ class FiredPulses:
         """Note that all pulses up to `time` have been reported."""
         if self._trusted:
             self._until = time
-            self._forget_before(self._on_line(time) - self._reach_ns)
+            self._forget_before(self._offset.on_line(time) - self._reach_ns)
 
     def covers(self, time: HostNs) -> bool:
         """Whether the source has reported all pulses up to a time: there were no others."""
-        return self._trusted and self._until is not None and self._on_line(self._until) >= time
+        return self._trusted and self._until is not None and self._offset.on_line(self._until) >= time
 
     def tells(self, now: HostNs) -> bool:
         """Whether the source reports its pulses at present: other pulses have not fired."""
@@ -136,7 +185,7 @@ class FiredPulses:
         last = self._train.last
         if self._until is None or last is None or now >= self._until + _SILENT_NS:
             return False
-        return before - last > _GAP_PERIODS * self._train.period_ns and self._on_line(self._until) < before
+        return before - last > _GAP_PERIODS * self._train.period_ns and self._offset.on_line(self._until) < before
 
     def next_unseen(self, before: HostNs | None) -> HostNs | None:
         """Time of the next pulse of the source that is surely none of the open ones; None: there is none.
@@ -145,11 +194,11 @@ class FiredPulses:
             before: time of the first open pulse; None: there is none.
         """
         last = self._train.last
-        while self._queue and last is not None and self._on_line(self._queue[0]) <= last + self._reach_ns:
+        while self._queue and last is not None and self._offset.on_line(self._queue[0]) <= last + self._reach_ns:
             self._pass_over(self._queue.popleft())
         if not self._queue:
             return None
-        place = self._on_line(self._queue[0])
+        place = self._offset.on_line(self._queue[0])
         return None if before is not None and before <= place + self._reach_ns else HostNs(round(place))
 
     def skip(self) -> None:
@@ -168,20 +217,20 @@ class FiredPulses:
         if inserted:
             self._queue.popleft()
             if missed:
-                self.unseen += 1
-                self.unseen_at = time
+                self.counts.unseen += 1
+                self.counts.unseen_at = time
             return
         self._first = self._first or time
         if self._until is None:
             self._decided.append(time)
             return
         reach = self._reach_ns
-        while self._queue and self._on_line(self._queue[0]) < time - reach:
+        while self._queue and self._offset.on_line(self._queue[0]) < time - reach:
             self._pass_over(self._queue.popleft())
-        if self._queue and self._on_line(self._queue[0]) <= time + reach:
+        if self._queue and self._offset.on_line(self._queue[0]) <= time + reach:
             fired = self._queue.popleft()
             if seen:
-                self._learn(time - fired)
+                self._offset.learn(time - fired)
             return
         if time >= self._since:
             self._decided.append(time)
@@ -189,24 +238,17 @@ class FiredPulses:
     @property
     def _reach_ns(self) -> float:
         """Pulses of source and cameras that are this close are the same."""
-        return min(self._intervals, default=self._train.period_ns) / 2
-
-    def _on_line(self, time: HostNs) -> float:
-        return time + self._offset_ns
-
-    def _learn(self, offset_ns: int) -> None:
-        self._differences.append(offset_ns)
-        self._offset_ns = sorted(self._differences)[len(self._differences) // 2]
+        return min(self._reports.intervals, default=self._train.period_ns) / 2
 
     def _pass_over(self, time: HostNs) -> None:
         """Count a pulse that has no tag, unless the source or the cameras have only just begun."""
-        place = self._on_line(time)
+        place = self._offset.on_line(time)
         if self._first is not None and place > max(self._first, self._before or self._first):
-            self.untagged += 1
-            self.unseen_at = HostNs(round(place))
+            self.counts.untagged += 1
+            self.counts.unseen_at = HostNs(round(place))
 
     def _forget_before(self, time: float) -> None:
         """Count the decided pulses that the source has passed over."""
         while self._decided and self._decided[0] < time:
-            self.unfired_at = self._decided.popleft()
-            self.unfired += 1
+            self.counts.unfired_at = self._decided.popleft()
+            self.counts.unfired += 1

@@ -19,7 +19,7 @@ from rig.errors import BadInputError
 Times = NDArray[np.float64]
 
 #: Pulses are the same if their times agree to this share of the time between two pulses.
-_NEAR: Final = 0.25
+_AGREE_SHARE: Final = 0.25
 #: Two computers' clocks differ in rate by less than this (crystals: 50 ppm each; NTP slews by 500 ppm at most, rarely).
 _RATE_MAX: Final = 3e-4
 #: The ratio of both rhythms is used where it is known to this.
@@ -38,10 +38,10 @@ _MAD: Final = 1.4826
 _PAIRS: Final = 4_000_000
 _ANCHORS: Final = 256
 #: Offsets at which fewer pulses are the same than this share of the most are no rivals: they join the logs at an end.
-_SHARE: Final = 0.5
-_LEAST: Final = 3
+_VOTES_SHARE: Final = 0.5
+_PULSES_LEAST: Final = 3
 #: Trying an offset takes some milliseconds.
-_MOST: Final = 20_000
+_OFFSETS_MOST: Final = 20_000
 #: The offset is followed along the recording in steps of so many pulses.
 _STEP: Final = 64
 #: Beyond so many standard deviations the times of a pulse are no longer of the same one; never below the clocks' error.
@@ -135,15 +135,17 @@ class _Aligning:
     """The two trains on small numbers: ns since the first pulse of each."""
 
     def __init__(self, first: Train, second: Train) -> None:
-        if min(len(first.times), len(second.times)) < _LEAST:
-            raise BadInputError(f"a log has fewer than {_LEAST} pulses: too few to find the same ones in the other")
+        if min(len(first.times), len(second.times)) < _PULSES_LEAST:
+            raise BadInputError(
+                f"a log has fewer than {_PULSES_LEAST} pulses: too few to find the same ones in the other"
+            )
         self._one, self._two = first, second
         self._zero = int(first.times[0]), int(second.times[0])
         self._a: Times = (first.times - self._zero[0]).astype(float)
         self._b: Times = (second.times - self._zero[1]).astype(float)
         self._apart = float(self._zero[0] - self._zero[1])  # offset between the small numbers: UTC agrees at -apart
         intervals = np.concatenate([np.diff(self._a), np.diff(self._b)])
-        self._near = _NEAR * float(np.percentile(intervals, 1))
+        self._near = _AGREE_SHARE * float(np.percentile(intervals, 1))
         self._rate = _rate_between(self._a, self._b)
         errors = first.error_ns, second.error_ns
         self._window = None if None in errors else float(sum(error or 0.0 for error in errors)) + self._near
@@ -157,7 +159,7 @@ class _Aligning:
             fit
             for fit in fits
             if abs(fit.offset - best.offset) > 2 * self._near
-            and len(fit.first) >= _SHARE * len(best.first)
+            and len(fit.first) >= _VOTES_SHARE * len(best.first)
             and _evidence(best, fit) < _CERTAIN
         ]
         if rivals:
@@ -184,7 +186,9 @@ class _Aligning:
                 "same pulses, or a clock was set meanwhile; name two logs of the same pulses"
             )
         most = max(len(fit.first) for fit in sound)
-        return min((fit for fit in sound if len(fit.first) >= _SHARE * most), key=lambda fit: _cost(fit, self._near))
+        return min(
+            (fit for fit in sound if len(fit.first) >= _VOTES_SHARE * most), key=lambda fit: _cost(fit, self._near)
+        )
 
     def _offsets(self) -> Iterator[float]:
         """Offsets at which several pulses could be the same."""
@@ -199,11 +203,11 @@ class _Aligning:
         places, votes = np.unique(np.floor(apart / width).astype(np.int64), return_counts=True)
         joined = np.diff(places) == 1
         before, after = np.append(0, votes[:-1] * joined), np.append(votes[1:] * joined, 0)
-        enough = (votes >= _SHARE / 2 * votes.max()) & (votes > before) & (votes >= after)
-        if np.sum(enough) > _MOST:
+        enough = (votes >= _VOTES_SHARE / 2 * votes.max()) & (votes > before) & (votes >= after)
+        if np.sum(enough) > _OFFSETS_MOST:
             raise BadInputError(
-                f"their pulses could be the same at more than {_MOST} offsets{self._within()}: keep the clocks of both "
-                "computers right by NTP or PTP"
+                f"their pulses could be the same at more than {_OFFSETS_MOST} offsets{self._within()}: keep the "
+                "clocks of both computers right by NTP or PTP"
             )
         apart.sort()
         for place in places[enough]:
@@ -216,7 +220,7 @@ class _Aligning:
         rate = self._rate
         first, second, residuals = self._matched(offset, rate)
         for _ in range(2):
-            if len(first) < _LEAST:
+            if len(first) < _PULSES_LEAST:
                 return None
             shift, more = _line(self._b[second], residuals)
             offset, rate = offset + shift, rate + more
@@ -226,7 +230,7 @@ class _Aligning:
                 residuals = residuals - shift - more * self._b[second]  # the same pulses are near enough
                 break
             first, second, residuals = self._matched(offset, rate)
-        if len(first) < _LEAST or not self._is_allowed(offset, rate):
+        if len(first) < _PULSES_LEAST or not self._is_allowed(offset, rate):
             return None
         measured = self._one.seen[first] & self._two.seen[second]
         steps = np.diff(residuals[measured])
@@ -303,7 +307,7 @@ def _rate_between(first: Times, second: Times) -> float:
         intervals = np.diff(times)
         middle = float(np.median(intervals))
         even = intervals[np.abs(intervals - middle) < 0.05 * middle]
-        if 2 * len(even) < len(intervals) or len(even) < _LEAST:
+        if 2 * len(even) < len(intervals) or len(even) < _PULSES_LEAST:
             return 0.0
         means.append(float(np.mean(even)))
         errors.append(float(np.std(even)) / math.sqrt(len(even)) / middle)
@@ -321,7 +325,7 @@ def _line(times: Times, residuals: Times) -> tuple[float, float]:
     """A straight line through residuals, without those far off: value at time 0, and slope."""
     middle = float(np.median(residuals))
     near = np.abs(residuals - middle) <= 3 * _MAD * max(1.0, float(np.median(np.abs(residuals - middle))))
-    if np.sum(near) < 2 * _LEAST:
+    if np.sum(near) < 2 * _PULSES_LEAST:
         return middle, 0.0
     slope, value = np.polyfit(times[near], residuals[near], 1)
     return float(value), float(slope)
@@ -337,7 +341,7 @@ def _followed(times: Times, residuals: Times) -> tuple[Times, Times]:
 def _most_unseen(common: int) -> float:
     """Pulses that may be in one log only, by chance, beside so many that are in both."""
     expected = 2 * _UNSEEN * common
-    return expected + 5 * math.sqrt(expected) + _LEAST
+    return expected + 5 * math.sqrt(expected) + _PULSES_LEAST
 
 
 def _cost(fit: _Fit, near: float) -> float:

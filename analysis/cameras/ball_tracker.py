@@ -23,8 +23,8 @@ from rig.images.picture import Grey
 
 _LARGEST = 16  # px, radius of a ball
 _AROUND = 3  # px around a ball that are matched too
-_NEAR = 0.05  # px: a displacement that is predicted so well needs no second step
-_STEPS = 6
+_SETTLED_PX = 0.05  # px: a displacement that is predicted so well needs no second step
+_STEPS_MOST = 6
 _PIXEL_GATE = 3.5  # sigmas at which a pixel is left out
 _SHARE = 0.7  # of the pixels of a ball that must agree
 _GAIN = (0.3, 3.0)  # of a ball against its static image: outside of that something hides it
@@ -116,7 +116,7 @@ class BallTracker:
     def _from(self, frame: Grey, start: Floats) -> FrameTurn | None:
         """Match from predicted displacements (n, 2)."""
         off = np.array(start, float)
-        for _ in range(_STEPS):
+        for _ in range(_STEPS_MOST):
             step, variance, sound = self._matched(frame, off)
             turn, covariance, kept = self._turn(off + step, variance, sound)
             if turn is None:
@@ -124,7 +124,7 @@ class BallTracker:
             change = np.abs(self.by_turn @ turn - off)[kept].max()
             measured = off + step
             off = self.by_turn @ turn
-            if change < _NEAR:
+            if change < _SETTLED_PX:
                 break
         else:
             return None

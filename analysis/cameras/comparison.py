@@ -27,7 +27,7 @@ from rig.phrase import Phrase, phrase
 
 _ALIKE = 0.005  # of the image's width: balls displaced alike differ by less, also where the camera rolled a little
 _CHANCE = 1e-3  # that balls agree although they are others
-_ROUNDS = 4
+_ROUNDS_MOST = 4
 _FEWEST_CAMERAS = 2
 
 
@@ -157,7 +157,7 @@ def _matched(
     xyz = {name: calibration.balls[name].xyz for name in names}
     pairs = _alike(there[:, :2], found.xy, placed.size)
     change = None
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS_MOST):
         if len(pairs) < FEWEST:
             return None
         after = {

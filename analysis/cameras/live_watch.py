@@ -25,7 +25,7 @@ from rig.pulse import PulseNumber
 
 _BLOCK: Final = 4  #: frames
 _BLOCKS: Final = 16  #: that are looked at together, the latest ones
-_FEWEST: Final = 3  #: frames that tell whether a camera shakes
+_FRAMES_LEAST: Final = 3  #: frames that tell whether a camera shakes
 
 
 class LiveWatch:
@@ -99,7 +99,7 @@ class LiveWatch:
 
 def _shakes(turns: Sequence[FrameTurn]) -> bool:
     """Whether frames differ from the static image by more than the noise of their turns."""
-    if len(turns) < _FEWEST:
+    if len(turns) < _FRAMES_LEAST:
         return False
     off, covariance = np.array([turn.turn for turn in turns]), np.array([turn.covariance for turn in turns])
     squares = float((off * np.linalg.solve(covariance, off[..., None])[..., 0]).sum())

@@ -17,7 +17,7 @@ from rig.phrase import Phrase, phrase
 from rig.phrases import enumerated
 
 FAMILY_RISK: Final = 3e-4  #: chance that a recording with still cameras is said to have a moved one
-_FEWEST = 5  # blocks
+_BLOCKS_LEAST = 5  # blocks
 _CLEARLY = 3.0  # times less residuals must be left if a block is left out
 _SAID = 0.25  # of the largest part of a turn: smaller parts are not worth words
 STEADY: Final = 2e-5  #: rad (0.001 deg): smaller changes of the images have other causes than a camera that moves
@@ -66,7 +66,7 @@ def find_moves(blocks: Sequence[Block], cameras: int) -> list[Move]:
         blocks: in order.
         cameras: number of cameras that are tested; all share the risk.
     """
-    if len(blocks) < _FEWEST:
+    if len(blocks) < _BLOCKS_LEAST:
         return []
     turns = np.array([block.turn for block in blocks])
     middle = np.array([(block.first + block.last) / 2 for block in blocks])

@@ -21,7 +21,7 @@ _FEWEST_FOR_SHIFT = 6  # balls that show a shift too, and whether they agree
 _SHIFT_RISK = 1e-3  # chance that a shift is taken where there is none
 _BALL_RISK = 1e-3  # chance that any sound ball of an image is left out
 _MOST_LEFT_OUT = 0.4  # share of the balls
-_STEPS, _ENOUGH = 6, 1e-3  # iterations, sigmas
+_STEPS_MOST, _SETTLED_SIGMAS = 6, 1e-3  # iterations, sigmas
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,7 +159,7 @@ def _fitted(placed: PlacedCamera, seen: Displacements, kept: Flags, parameters: 
     weight = np.linalg.inv(seen.covariance)
     chosen = slice(6 - parameters, 6)
     current = placed
-    for _ in range(_STEPS):
+    for _ in range(_STEPS_MOST):
         predicted = seen.before + (current.project(seen.xyz) - before)
         by_pose = current.linearised(seen.xyz, predicted)[2][:, :, :6][:, :, chosen]
         v = np.nan_to_num(seen.after - predicted)
@@ -172,7 +172,7 @@ def _fitted(placed: PlacedCamera, seen: Displacements, kept: Flags, parameters: 
             position=current.position + whole[:3],
             rotation=current.rotation @ rotation_from_vector(whole[3:]),
         )
-        if float(step @ normal @ step) < _ENOUGH**2:
+        if float(step @ normal @ step) < _SETTLED_SIGMAS**2:
             break
     values[:3] = current.position - position
     values[3:] = vector_from_rotation(rotation.T @ current.rotation)

@@ -33,7 +33,7 @@ _GATE_P: Final = 1e-5  #: a measurement that is less likely than this is not use
 #: Likewise of a ski that fewer images show than contradict each other if one is wrong.
 _ALONE_P: Final = 1e-3
 _CONTROLLED: Final = 3
-_STEPS, _REMOVALS = 8, 4
+_STEPS_MOST, _REMOVALS = 8, 4
 #: How far a jumper's skis turn at all: standard deviations of slope, its difference, heading and opening (rows), of
 #: value, speed and acceleration (columns), rad, rad/s, rad/s^2. Nothing may be less certain: so much is known unseen.
 _SKI_LIMITS: Final = np.array(((0.45, 2.0, 30.0), (0.3, 1.0, 15.0), (0.25, 1.0, 15.0), (0.5, 2.0, 30.0)))
@@ -165,7 +165,7 @@ class CausalFilter:
         states = np.concatenate((start.channels, speed, np.zeros_like(speed)), axis=1)
         shared = np.zeros(self._root.shape[1] + m)
         begin = begun(model, states, near(model, states, shared), shared)
-        adjusted = without_gross_errors(settled(begin, _STEPS), _REMOVALS)
+        adjusted = without_gross_errors(settled(begin, _STEPS_MOST), _REMOVALS)
         rank, solution = self._root.shape[1], adjusted.solution
         cross = solution.cross[:, :, :rank]
         of_u = solution.shared_covariance[:rank, :rank]

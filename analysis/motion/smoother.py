@@ -35,7 +35,7 @@ from rig.phrase import Phrase, phrase
 
 _FREE_FRAMES: Final = 2.0  #: standard deviation of a camera's lateness before it is known, pulse intervals
 _TRIGGER_S: Final = 20e-6  #: of cameras that obey one trigger
-_STEPS, _ROUNDS, _COMPONENT_STEPS, _REMOVALS, _SCALINGS = 12, 2, 3, 12, 4
+_STEPS_MOST, _TAKEOFF_ROUNDS, _COMPONENT_STEPS, _REMOVALS, _SCALINGS = 12, 2, 3, 12, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ def _with_free_cameras(
     channels = start.channels
     speed = np.gradient(channels, observed.times, axis=0) * unit
     states = np.concatenate((channels, speed, np.zeros_like(channels)), axis=1)
-    free = settled(begun(model, states, near(model, states, shared), shared), _STEPS)
+    free = settled(begun(model, states, near(model, states, shared), shared), _STEPS_MOST)
     free, factors = fitting_sigmas(free, _SCALINGS)
     return without_gross_errors(free, _REMOVALS), factors
 
@@ -188,14 +188,14 @@ def _synchronised(free: Adjusted, synchrony: Synchrony) -> Adjusted:
     model = replace(free.model, late=expected, late_sigma=sigma, clock_is_mean=False)
     shared = free.shared.copy()
     shared[model.root.shape[1] :] = expected
-    return settled(begun(model, free.states, free.used, shared), _STEPS)
+    return settled(begun(model, free.states, free.used, shared), _STEPS_MOST)
 
 
 def _with_takeoff(adjusted: Adjusted, known: Floats | None) -> tuple[Adjusted, Break | None]:
     """Take-off and densities of the motion, in turn; then gross errors once more."""
     densities = start_densities()
     edge = None
-    for _ in range(_ROUNDS):
+    for _ in range(_TAKEOFF_ROUNDS):
         edge = find_break(adjusted, densities) if known is None else passing(adjusted, known)
         for _ in range(_COMPONENT_STEPS):
             adjusted = with_prior(adjusted, _prior(adjusted, edge, densities))

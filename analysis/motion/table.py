@@ -12,7 +12,7 @@ from analysis.result.model import EDGE_S, Quantity, Vector
 from rig.arrays import Floats
 
 GRAVITY: Final = 9.81  # m/s^2
-_FEWEST = 3  # pulses on the table
+_PULSES_LEAST = 3  # pulses on the table
 _STEP = 1e-6  # m/s, for derivatives by central differences
 
 
@@ -38,7 +38,7 @@ def table_motion(adjusted: Adjusted, edge: Break) -> TableMotion | None:
     times, unit = adjusted.model.observed.times, adjusted.model.prior.unit
     on_table = np.flatnonzero(times < edge.seconds)
     begin, end = edge.seconds + EDGE_S / 2, edge.seconds + 3 * EDGE_S / 2
-    if len(on_table) < _FEWEST or end > times[-1]:
+    if len(on_table) < _PULSES_LEAST or end > times[-1]:
         return None
     by_states = np.zeros((*adjusted.states.shape, 9))
     centred = times[on_table] - times[on_table].mean()

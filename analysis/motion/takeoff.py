@@ -19,7 +19,7 @@ from analysis.result.model import EDGE_S
 from rig.arrays import Floats
 
 _COARSE_S: Final = 1 / 60  # steps of the search
-_SPREAD, _MOST_LEAN = 3.0, 2.0  # a b and |b - a| of the outer nodes mean - a and mean + b, in sigmas
+_NODES_SPREAD, _MOST_LEAN = 3.0, 2.0  # a b and |b - a| of the outer nodes mean - a and mean + b, in sigmas
 _FINE: Final = 41  # times of the final grid
 _SUPPORT: Final = 8.0  # of log-likelihood below the greatest: less likely times do not count
 #: Acceleration of O in the first pulse, m/s^2 (Z up): of a table, and of a flight. Their spread covers any in-run.
@@ -140,7 +140,7 @@ def _three_nodes(
     """
     lean = float(np.clip(third / sigma**2, -_MOST_LEAN * sigma, _MOST_LEAN * sigma))
     # Nodes mean - a and mean + b: variance p a^2 + q b^2, third moment q b^3 - p a^3; b - a = lean, a b = 3 sigma^2.
-    a = (-lean + np.sqrt(lean**2 + 4 * _SPREAD * sigma**2)) / 2
+    a = (-lean + np.sqrt(lean**2 + 4 * _NODES_SPREAD * sigma**2)) / 2
     b = a + lean
     p, q = sigma**2 / (a * (a + b)), sigma**2 / (b * (a + b))
     return (mean - a, mean, mean + b), (p, 1 - p - q, q)

@@ -27,7 +27,7 @@ UNTOLD: Final = phrase(
 )
 _BODY: Final = ("P1", "P2")
 _BINDINGS: Final = tuple((binding, side) for side, binding in BINDING_OF.items())
-_FEWEST: Final = 3  #: pulses that bear a name out; in one or two it may be a coincidence
+_PULSES_LEAST: Final = 3  #: pulses that bear a name out; in one or two it may be a coincidence
 _SIGMAS: Final = 3.0  #: of the angle between both skis, so that it is beyond doubt
 _AHEAD_M: Final = 0.1  #: the feet of a jumper are side by side; of what lies farther ahead one is no binding
 
@@ -54,9 +54,9 @@ def told_names(states: Sequence[JumperState]) -> frozenset[str]:
     if body.looks(_BODY):
         told.update(_BODY)
     on_ski = {p: sum(s.points[p] is not None and s.skis[side] is not None for s in states) for p, side in _BINDINGS}
-    if max(on_ski.values()) >= _FEWEST:
-        told.update(p for p, count in on_ski.items() if count >= _FEWEST and not body.contradicts(p, told))
-    if sum(None not in state.points.values() for state in states) >= _FEWEST and all(
+    if max(on_ski.values()) >= _PULSES_LEAST:
+        told.update(p for p, count in on_ski.items() if count >= _PULSES_LEAST and not body.contradicts(p, told))
+    if sum(None not in state.points.values() for state in states) >= _PULSES_LEAST and all(
         map(body.looks, combinations(POINTS, 2))
     ):
         told.update(POINTS)
@@ -81,7 +81,7 @@ def _opens(states: Sequence[JumperState]) -> bool:
         if right is not None and left is not None:
             apart = (left.heading.value - right.heading.value + 180.0) % 360.0 - 180.0
             opening.append(apart / float(np.hypot(left.heading.sigma, right.heading.sigma)))
-    beyond = np.sum(np.array(opening) > _SIGMAS) >= _FEWEST
+    beyond = np.sum(np.array(opening) > _SIGMAS) >= _PULSES_LEAST
     return bool(beyond and np.median(opening) > 0.0)
 
 
@@ -96,7 +96,7 @@ def _ahead_m(states: Sequence[JumperState]) -> float:
         if right is not None and left is not None and one is not None and other is not None:
             along = one.direction + other.direction
             ahead.append(abs(float((left.xyz - right.xyz) @ along)) / float(np.linalg.norm(along)))
-    return float(np.median(ahead)) if len(ahead) >= _FEWEST else 0.0
+    return float(np.median(ahead)) if len(ahead) >= _PULSES_LEAST else 0.0
 
 
 def untold_line(states: Sequence[JumperState], told: Collection[str]) -> Phrase | None:
@@ -193,7 +193,7 @@ class _Body:
             second: another name for the second one.
         """
         squares = self._squares(pair, second)
-        return len(squares) >= _FEWEST and float(np.median(squares)) < USUAL
+        return len(squares) >= _PULSES_LEAST and float(np.median(squares)) < USUAL
 
     def rather(self, pair: tuple[str, str], second: str) -> bool:
         """Whether the second point of a pair is what it is named rather than `second`.
@@ -204,7 +204,7 @@ class _Body:
         one, other = map(POINTS.index, pair)
         more = log_spread(one, POINTS.index(second)) - log_spread(one, other)
         ratios = self._squares(pair, second) - self._squares(pair) + more
-        telling = len(ratios) >= _FEWEST and float(np.sort(ratios)[-_FEWEST]) >= USUAL
+        telling = len(ratios) >= _PULSES_LEAST and float(np.sort(ratios)[-_PULSES_LEAST]) >= USUAL
         return bool(telling and np.median(ratios) > 0.0)
 
     def looks_like_the_other_side(self, binding: str) -> bool:
@@ -212,12 +212,12 @@ class _Body:
         other = next(name for name, _ in _BINDINGS if name != binding)
         pairs = [(name, binding) for name in _BODY]
         found = [self._squares(pair, other) - self._squares(pair) for pair in pairs]
-        return any(len(more) >= _FEWEST and float(np.median(more)) < 0.0 for more in found)
+        return any(len(more) >= _PULSES_LEAST and float(np.median(more)) < 0.0 for more in found)
 
     def contradicts(self, name: str, others: Collection[str]) -> bool:
         """Whether a point does not look like what it is named beside some others."""
         found = [self._squares((name, other)) for other in others]
-        return any(len(squares) >= _FEWEST and float(np.median(squares)) >= USUAL for squares in found)
+        return any(len(squares) >= _PULSES_LEAST and float(np.median(squares)) >= USUAL for squares in found)
 
     def _squares(self, pair: tuple[str, str], second: str | None = None) -> Floats:
         """Implausibility in each pulse that shows both."""

@@ -37,7 +37,7 @@ _MANY_REMOVED: Final = 0.1
 #: The paper's requirement for coordinates, m (0.2 dm).
 REQUIRED_SIGMA_M: Final = 0.02
 #: A camera that has so many points of the jumper in its images must contribute this share of them.
-_ENOUGH, _FITTING = 20, 0.25
+_POINTS_LEAST, _FITTING_SHARE = 20, 0.25
 #: Sigmas in the images that had to be enlarged by more than this are mentioned.
 _ENLARGED: Final = 1.2
 #: Fewest cameras that must have a point in their image for the pulse to count as in sight.
@@ -204,7 +204,7 @@ def _contradicting(
     for name, placed in cameras.items():
         places = [_places(pulse) for pulse, frames in delivered if name in frames]
         there = sum(int(placed.shows(of_pulse).sum()) for of_pulse in places if len(of_pulse))
-        if there >= _ENOUGH and used[name] < _FITTING * there:
+        if there >= _POINTS_LEAST and used[name] < _FITTING_SHARE * there:
             text = (
                 "camera {camera} has the jumper's points in its images {there} times, and only {used} times where the "
                 "other cameras see them: check its trigger, and whether it was moved"

@@ -15,7 +15,9 @@ from analysis.pulses.skis import SkiLines, across_axes
 from photogrammetry.jumper.stick_model import by_slope_and_heading
 from rig.arrays import Flags, Floats, Integers
 
-_TWICE = 2.0**2  # growth of a variance without an image: with more, it is that image that tells where the object is
+_VARIANCE_GROWTH = (
+    2.0**2
+)  # growth of a variance without an image: with more, it is that image that tells where the object is
 _UNCONTROLLED = 2  # images of a ski: three leave two observations over
 
 
@@ -68,7 +70,7 @@ def give_up_points(points: Objects, checked: Checked, calibration: Floats, expec
     chi_square = (off * np.linalg.solve(total, off)).sum(axis=(1, 2))
     without = adjust(points.subset(rows), calibration, checked.used[rows] & ~expected.doubted[rows])
     growth = np.linalg.eigvals(np.linalg.solve(adjusted.covariance[rows], without.covariance)).real.max(axis=1)
-    lost = rows[(chi_square > special.chdtri(3, RISK)) & (~without.ok | (growth > _TWICE))]
+    lost = rows[(chi_square > special.chdtri(3, RISK)) & (~without.ok | (growth > _VARIANCE_GROWTH))]
     return _without(points, checked, lost)
 
 

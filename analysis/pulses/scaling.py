@@ -17,7 +17,7 @@ from rig.arrays import Floats
 RISK = 0.001
 _LARGEST_PX = 1.0  # larger errors are mistakes, or cameras that are not synchronous, and no scatter
 _MOST_STEPS = 8
-_ENOUGH = 1.02  # of the last step, where the share of the calibration keeps it from being exact
+_SETTLED_FACTOR = 1.02  # of the last step, where the share of the calibration keeps it from being exact
 
 _Scalable = TypeVar("_Scalable", bound="Scalable")
 
@@ -62,7 +62,7 @@ def scaled_to_fit(
         factor *= step
         if factor * objects.sigma() > _LARGEST_PX:
             return objects, first, 1.0
-        if step < _ENOUGH:
+        if step < _SETTLED_FACTOR:
             break
         adjusted = [adjust(each.scaled(factor), calibration) for each in (objects, *readings)]
     if factor <= 1:

@@ -19,7 +19,7 @@ from rig.arrays import Flags, Floats
 BAND_SIGMAS = 2.0
 _FIG8_POSITIONS = 5
 _WHOLE = 4  # lines of a stick model: body, feet, two skis
-_WIDE = 4.0  # times the median sigma: bands wider than that may be cut off
+_WIDE_SIGMAS = 4.0  # times the median sigma: bands wider than that may be cut off
 _ROOM = 0.06  # of the values' range, above and below
 
 
@@ -237,7 +237,7 @@ def _x_label(course: Course) -> Said:
 
 def _range(value: Floats, sigma: Floats, least: float) -> tuple[float, float]:
     """Limits of the values' axis; a few wide bands are cut off rather than flatten the curve."""
-    half = BAND_SIGMAS * np.minimum(sigma, _WIDE * np.median(sigma))
+    half = BAND_SIGMAS * np.minimum(sigma, _WIDE_SIGMAS * np.median(sigma))
     bottom, top = float((value - half).min()), float((value + half).max())
     room = max(_ROOM * (top - bottom), (least - (top - bottom)) / 2)
     return bottom - room, top + room

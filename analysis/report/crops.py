@@ -18,7 +18,7 @@ from rig.arrays import Floats
 #: Size of a crop in page units.
 CROP_WIDTH, CROP_HEIGHT = 320, 240
 _ASPECT = CROP_WIDTH / CROP_HEIGHT
-_MARGIN = 1.15  # around the largest jumper that a camera shows
+_MARGIN_FACTOR = 1.15  # around the largest jumper that a camera shows
 _LEAST_PX = 48.0  # a smaller window shows nothing of what is around the jumper
 #: From the best to the smallest: width of a picture in px, quality of WebP.
 _LEVELS = ((480, 80), (400, 72), (320, 65), (256, 55), (200, 45), (160, 35))
@@ -93,7 +93,9 @@ def windows_of(overlays: Mapping[int, Mapping[str, Overlay]], system: CameraSyst
             if ((middle >= 0) & (middle < system[name].size)).all():
                 middles[pulse, name] = middle
                 across, down = np.ptp(places, axis=0)
-                widths[name] = max(widths.get(name, _LEAST_PX), across * _MARGIN, down * _ASPECT * _MARGIN)
+                widths[name] = max(
+                    widths.get(name, _LEAST_PX), across * _MARGIN_FACTOR, down * _ASPECT * _MARGIN_FACTOR
+                )
     return {key: _window(middle, widths[key[1]], system[key[1]].size) for key, middle in middles.items()}
 
 

@@ -25,13 +25,13 @@ _LEAST_CONTRAST = 6.0  # grey values
 _NOISE_FACTOR = 6.0  # contrast over the noise of the static image
 _ROUND = 3.0  # ratio of the curvatures of a blob, at most
 _RADII = (0.8, 16.0)  # px
-_STEPS = 14  # of the fit: balls need 4 to 12
+_STEPS_MOST = 14  # of the fit: balls need 4 to 12
 _STRETCH = 0.5  # log of the ratio of the axes
 _MISFIT = 0.2  # residuals over contrast
 _MISFIT_AT_START = 0.3  # the same for a disc where the blob is, before it is fitted
 _WORST_SIGMA = 0.35  # px
 _SPOILT = 1.5  # times the noise: with larger residuals something lies close around a ball
-_TIGHT = 1.8  # px around a ball that are fitted then
+_TIGHT_MARGIN_PX = 1.8  # px around a ball that are fitted then
 _CONTRADICTION = float(chdtri(2, 0.001))
 
 
@@ -91,11 +91,11 @@ def _fitted(grey: Floats, sigma: Floats, xy: Floats, radius: Floats) -> list[Dis
     """The balls at places (n, 2), where there are some. What lies close around one is left out if it spoils the fit."""
 
     def fitted(chosen: Integers, margin: float) -> list[Disc | None]:
-        return fit_discs(grey, sigma, xy[chosen], radius[chosen], margin, _MISFIT_AT_START, _STEPS)
+        return fit_discs(grey, sigma, xy[chosen], radius[chosen], margin, _MISFIT_AT_START, _STEPS_MOST)
 
     found = [[disc] for disc in fitted(np.arange(len(xy)), MARGIN)]
     spoilt = [i for i, (disc,) in enumerate(found) if disc is None or disc.factor >= _SPOILT]
-    for i, disc in zip(spoilt, fitted(np.array(spoilt, int), _TIGHT), strict=True):
+    for i, disc in zip(spoilt, fitted(np.array(spoilt, int), _TIGHT_MARGIN_PX), strict=True):
         found[i].append(disc)
     balls = [[disc for disc in of_place if disc is not None and _is_ball(disc)] for of_place in found]
     shaded = fit_shaded_discs(grey, sigma, xy, radius)

@@ -37,7 +37,7 @@ _BLUR, _BLUR_SPREAD = 0.75, 0.5  # px; weak prior of log s, because radius and b
 _LOG_BLUR = log(_BLUR)
 _STRETCH_SPREAD = 0.2  # weak prior of the stretch
 STEPS: Final = 25  #: iterations
-_ENOUGH, _ENOUGH_OF_SHAPE = 1e-4, 1e-3  # of a step: px; log R, log s and stretch
+_SETTLED_PX, _SETTLED_SHAPE = 1e-4, 1e-3  # of a step: px; log R, log s and stretch
 _LOG_RADII, _LOG_BLURS = (log(0.2), log(40)), (log(0.15), log(8))  # that a fit may go through
 _SETTLED = 2e-5  # relative decrease of the square sum: a twentieth of a sigma or less
 _TRIAL_STEPS, _POOR = 4, 0.25  # steps after which the residuals over the contrast must be smaller than that
@@ -285,7 +285,7 @@ def _fitted(theta: Floats, promising: Flags, windows: _Windows, steps: int) -> t
         given_up = better & (number >= _TRIAL_STEPS) & (cost[active] > poor[active] * best[active, 6] ** 2)
         step = _step(normal[active], gradient[active], damping[active])
         size = np.abs(step[:, :6])
-        small = ~settled & (size[:, :2].max(axis=1) < _ENOUGH) & (size[:, 2:].max(axis=1) < _ENOUGH_OF_SHAPE)
+        small = ~settled & (size[:, :2].max(axis=1) < _SETTLED_PX) & (size[:, 2:].max(axis=1) < _SETTLED_SHAPE)
         trial[active] = best[active] + step
         best[active[small & ~given_up]] = trial[active[small & ~given_up]]
         settled |= small & ~given_up

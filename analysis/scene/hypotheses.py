@@ -19,7 +19,7 @@ from photogrammetry.geometry.ideal_camera import unit_rays
 from photogrammetry.geometry.rotation import cross
 from rig.arrays import Flags, Floats, Integers
 
-_NEAR = 0.008  # of the image's width: a projected ball so near to a detection is a hit
+_HIT_SHARE = 0.008  # of the image's width: a projected ball so near to a detection is a hit
 _APART = 0.02  # of the image's width: two balls of a triple are at least so far from each other in the image
 _BORDER = 1.3  # the map of detections is so much larger than the image, because distortion is taken out
 _CHUNK = 8192  # triples at a time
@@ -221,7 +221,7 @@ def _map(xy: Floats, size: tuple[int, int]) -> NDArray[np.int16]:
     """The nearest detection at each pixel (y down) around the image centre, -1 where none is near."""
     columns, rows = (int(_BORDER * side) // 2 * 2 + 1 for side in size)
     nearest = np.full((rows, columns), -1, np.int16)
-    radius = _NEAR * size[0]
+    radius = _HIT_SHARE * size[0]
     distance = np.full((rows, columns), radius)
     reach = int(radius) + 1
     for i, (x, y) in enumerate(xy):

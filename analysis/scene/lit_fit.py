@@ -32,8 +32,8 @@ _MODEL_START, _MODEL_LEAST = 0.05, 0.002  # k
 _MODEL_FREEDOM = 30  # pixels that the median of an image counts for in a ball's own k
 _CORRELATED = 0.5  # of the radius: over so far the model's error is alike (or over _CORRELATED_LEAST px)
 _CORRELATED_LEAST = 1.5
-_STEPS, _STEPS_AGAIN = 15, 8
-_ENOUGH = 2e-3  # px
+_STEPS_MOST, _STEPS_REWEIGHTED = 15, 8
+_SETTLED_PX = 2e-3  # px
 _FARTHEST = 1.5  # px per step
 
 
@@ -100,15 +100,15 @@ def fit_lit_balls(static: Sequence[StaticImage], balls: SightedBalls, radius: fl
     common[0] = 1.0
     spread = np.concatenate((_LIGHT_SPREAD, np.full(cameras, _GAIN_SPREAD), np.full(cameras, _BLUR_SPREAD), [_HELD]))
     fit = _Fit(static, balls, common, spread)
-    fit.adjust(_STEPS, clipped=False)
+    fit.adjust(_STEPS_MOST, clipped=False)
     fit.weigh(clipped=False)
     if not known:
         fit.release_radius()
     fit.again()
-    fit.adjust(_STEPS, clipped=True)
+    fit.adjust(_STEPS_MOST, clipped=True)
     for _ in range(2):
         fit.weigh(clipped=True)
-        fit.adjust(_STEPS_AGAIN, clipped=True)
+        fit.adjust(_STEPS_REWEIGHTED, clipped=True)
     return fit.result()
 
 
@@ -121,10 +121,10 @@ def fit_in_known_light(static: Sequence[StaticImage], balls: SightedBalls, light
         light: of the others.
     """
     fit = _Fit(static, balls, light.common, np.full(len(light.common), _HELD), light.unit)
-    fit.adjust(_STEPS, clipped=True)
+    fit.adjust(_STEPS_MOST, clipped=True)
     fit.again()
     fit.weigh(clipped=True)
-    fit.adjust(_STEPS_AGAIN, clipped=True)
+    fit.adjust(_STEPS_REWEIGHTED, clipped=True)
     return fit.result()
 
 
@@ -236,7 +236,7 @@ class _Fit:
                 gained = cost - new[0]
                 self.state, (cost, normal, right) = tried, new
                 damping = max(damping / 10, 1e-9)
-                if np.median(far) < _ENOUGH and gained < 1e-4 * cost:
+                if np.median(far) < _SETTLED_PX and gained < 1e-4 * cost:
                     break
             else:
                 damping *= 10

@@ -38,7 +38,7 @@ _BELIEVED = 3.0  # decades by which chance is ruled out
 _CLEARLY = 2.0  # decades by which the second best is worse
 _OVERWHELMING = 8.0  # decades: such a hypothesis ends the search
 _RIVAL_TRIPLES = 3  # of named detections, on which all surveyed balls are tried in search of a rival
-_ROUNDS = 8
+_ROUNDS_MOST = 8
 _RIVALS = 6  # namings that are kept
 _SAME_PLACE = 5.0  # sigmas between the projection centres of two namings that are one
 _SAME_IMAGE = 0.01  # of the image's width, by which the balls move between them
@@ -205,7 +205,7 @@ class _Image:
         pairs = [(start.points, start.detections) for start in starts]
         poses: list[SinglePose | None] = [SinglePose(s.position, s.rotation, np.zeros((6, 6))) for s in starts]
         active = list(range(len(starts)))
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUNDS_MOST):
             fitted = self._fitted([poses[i] for i in active], [pairs[i] for i in active])
             for i, pose in zip(active, fitted, strict=True):
                 poses[i] = pose

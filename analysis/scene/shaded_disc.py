@@ -23,7 +23,7 @@ _UNKNOWNS = 8  # centre, log R, two of stretch, and the three of the brightness
 _STRETCH_SPREAD = 0.2
 _SHADE = 0.7  # of the contrast, per radius: what a light from the side does
 _NEXT_TO_NOTHING = 1e-9  # weight of an unknown without prior: where an image is flat, nothing tells of it
-_STEPS = 10
+_STEPS_MOST = 10
 _FARTHEST, _LARGEST = 0.7, 0.25  # of a step: px; log R
 
 
@@ -123,7 +123,7 @@ def _fitted(discs: _Discs) -> list[Disc | None]:
     start, first = discs.size.copy(), discs.xy.copy()
     discs.bright = np.zeros((len(first), 3))
     discs.bright[:, 0] = _of_disc(discs.grey, _model(discs)[1])
-    for _ in range(_STEPS):
+    for _ in range(_STEPS_MOST):
         equations = _equations(discs, start)
         step = np.linalg.solve(equations.normal, equations.right[..., None])[..., 0]
         discs.xy = discs.xy + np.clip(step[:, :2], -_FARTHEST, _FARTHEST)

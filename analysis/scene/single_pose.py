@@ -13,7 +13,7 @@ from photogrammetry.geometry.camera_model import Lens, image_point, linearise
 from photogrammetry.geometry.rotation import rotation_from_vector
 from rig.arrays import Floats
 
-_STEPS, _ENOUGH = 15, 1e-8
+_STEPS_MOST, _SETTLED_SQUARE = 15, 1e-8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +65,7 @@ def fit_poses(lens: Lens, starts: Sequence[SinglePose], matched: Sequence[Matche
     used = np.arange(xy.shape[1]) < np.array([len(one.xy) for one in matched])[:, None]
     position, rotation = np.array([s.position for s in starts]), np.array([s.rotation for s in starts])
     active = np.arange(len(starts))
-    for _ in range(_STEPS):
+    for _ in range(_STEPS_MOST):
         points, seen = xyz[active], used[active]
         v, by_pose, by_point = _at(lens, position[active], rotation[active], points, xy[active])
         total = xy_covariance[active] + by_point @ xyz_covariance[active] @ by_point.swapaxes(-1, -2)
@@ -81,7 +81,7 @@ def fit_poses(lens: Lens, starts: Sequence[SinglePose], matched: Sequence[Matche
         active, step, cofactors, normal = active[sound], step[sound], cofactors[sound], normal[sound]
         position[active] += step[:, :3]
         rotation[active] = rotation[active] @ rotation_from_vector(step[:, 3:])
-        settled = np.einsum("hi,hij,hj->h", step, normal, step) < _ENOUGH
+        settled = np.einsum("hi,hij,hj->h", step, normal, step) < _SETTLED_SQUARE
         for i, cofactor in zip(active[settled].tolist(), cofactors[settled], strict=True):
             fitted[i] = SinglePose(position[i].copy(), rotation[i].copy(), cofactor)
         active = active[~settled]

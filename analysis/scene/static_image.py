@@ -30,7 +30,7 @@ GreyImage = NDArray[np.float32]
 
 FRAMES = 31  #: of each camera, at most
 _MEMORY = 256 << 20  # bytes for the frames of all cameras together
-_FEWEST = 7  # frames of each camera even if they need more memory than that
+_FRAMES_LEAST = 7  # frames of each camera even if they need more memory than that
 _SAME = 0.9  # share of equal pixels from which two frames are one exposure
 _PROBES = 4096  # pixels that are compared for that
 _MAD_TO_SIGMA = 1.4826
@@ -99,7 +99,7 @@ def static_images(log: Path, pulses: range | None = None, frames: int = FRAMES) 
             )
         rows, columns = stored[0].tag.shape
         pixel = 4 if stored[0].tag.pixels.bits > 8 else 1  # bytes
-        count = max(_FEWEST, min(frames, _MEMORY // (rows * columns * pixel)))
+        count = max(_FRAMES_LEAST, min(frames, _MEMORY // (rows * columns * pixel)))
         wanted = _spread(stored, count)
         blocks: dict[str, list[Grey]] = {name: [] for name in wanted}
         for place in sorted(set().union(*wanted.values())):

@@ -19,7 +19,7 @@ from rig.errors import BadInputError
 from rig.phrase import Phrase, phrase
 
 _SURVEYED = (Role.CONTROL, Role.FIXED)
-_FEWEST = 4  # surveyed balls
+_BALLS_LEAST = 4  # surveyed balls
 _TABLES: Final = (".csv", ".txt", ".obc")  # what a total station or another program writes
 
 
@@ -206,14 +206,14 @@ def read_survey(path: Path) -> Survey:
             )
         )
     count = sum(p.role in _SURVEYED for p in network.points)
-    if count < _FEWEST:
+    if count < _BALLS_LEAST:
         raise BadInputError(
             phrase(
                 "survey_few_balls",
                 "{path}: has {count} surveyed balls (control or fixed); a camera needs at least {fewest} in sight",
                 path=str(path),
                 count=count,
-                fewest=_FEWEST,
+                fewest=_BALLS_LEAST,
             )
         )
     check_principal_distances(network.cameras, str(path))

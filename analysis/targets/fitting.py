@@ -10,8 +10,8 @@ from rig.arrays import Flags, Floats, Integers
 
 FIRST_BLUR: Final = 1.0  # px, to start from
 _BLUR: Final = (0.3, 4.0)  # px, in which a window shows edges at all
-_STEPS: Final = 25
-_ENOUGH: Final = 1e-4  # px, of a step
+_STEPS_MOST: Final = 25
+_SETTLED_PX: Final = 1e-4  # px, of a step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +72,7 @@ def fitted(start: Floats, linearised: Callable[[Floats, Integers], tuple[Floats,
     gradient = _times(slopes, residual)
     damping = np.full(count, 1e-3)
     moved = np.zeros(count)
-    for _ in range(_STEPS):
+    for _ in range(_STEPS_MOST):
         diagonal = np.einsum("nii->ni", normal[moving])
         damped = normal[moving] + (damping[moving, None] * diagonal + 1e-9)[..., None] * np.eye(size)
         step = -np.linalg.solve(damped, gradient[moving, :, None])[..., 0]
@@ -86,11 +86,11 @@ def fitted(start: Floats, linearised: Callable[[Floats, Integers], tuple[Floats,
         found, slopes = moving[better], slopes[better]
         unknowns[found], cost[found] = tried[better], tried_cost[better]
         normal[found], gradient[found] = slopes @ slopes.swapaxes(1, 2), _times(slopes, residual[better])
-        moving = moving[~better | (moved[moving] >= _ENOUGH)]
+        moving = moving[~better | (moved[moving] >= _SETTLED_PX)]
         if not len(moving):
             break
     cofactor = np.linalg.pinv(normal, hermitian=True)
-    return Fit(unknowns, cost, np.stack((cofactor[:, 0, 0], cofactor[:, 1, 1]), axis=1), moved < 10.0 * _ENOUGH)
+    return Fit(unknowns, cost, np.stack((cofactor[:, 0, 0], cofactor[:, 1, 1]), axis=1), moved < 10.0 * _SETTLED_PX)
 
 
 def _times(matrices: Floats, vectors: Floats) -> Floats:

@@ -19,7 +19,7 @@ _DOUBTFUL: Final = 2.0
 #: ... and two lenses are one if they take them down to this part.
 _EXPLAINED: Final = 0.5
 #: Pictures of a camera, below which two lenses explain anything.
-_FEWEST: Final = 6
+_PICTURES_LEAST: Final = 6
 
 
 def of_one_lens(network: Network) -> tuple[Network, list[str]]:
@@ -79,7 +79,7 @@ def _without_image(network: Network, image: int) -> Network:
 def _parts(network: Network, camera: int) -> list[list[int]]:
     """Parts of a camera's images that another lens may have taken: single ones, the last ones, those of another c."""
     mine = [k for k, image in enumerate(network.images) if image.camera == camera]
-    if len(mine) < _FEWEST:
+    if len(mine) < _PICTURES_LEAST:
         return []
     by_name = [mine[n:] if 2 * n > len(mine) else mine[:n] for n in range(2, len(mine) - 1)]
     return [*([k] for k in mine), *by_name, *_of_another_c(network, camera, mine)]

@@ -17,9 +17,9 @@ from analysis.targets.detection import Sight
 from analysis.targets.pattern import CORNERS, Layout, target_of
 from rig.arrays import Floats
 
-_ENOUGH: Final = 6  # corners of a resection
-_LEAST: Final = 4  # corners of a plane's pose
-_USUAL: Final = 1.2  # principal distance over the picture's width, where the pictures tell nothing
+_CORNERS_OF_RESECTION: Final = 6  # corners of a resection
+_CORNERS_OF_PLANE: Final = 4  # corners of a plane's pose
+_USUAL_DISTANCE: Final = 1.2  # principal distance over the picture's width, where the pictures tell nothing
 _LIKELY: Final = (0.4, 8.0)  # the same, of lenses that this is made for
 _FLIP: Final = np.diag([1.0, -1.0, -1.0])  # OpenCV's camera looks along +z with y down, ours along -z with y up
 
@@ -66,7 +66,7 @@ def start_values(sights: Sequence[tuple[str, Sight]], layout: Layout) -> Start:
             largest = max(planes[k], key=lambda plane: _extent(plane.seen))
             places.update(zip(largest.names, largest.flat, strict=True))
             pose = _plane_pose(largest, matrices[k])
-        elif counts[k] >= _ENOUGH:
+        elif counts[k] >= _CORNERS_OF_RESECTION:
             pose = _resected(sights[k][1], places, matrices[k])
         else:
             continue
@@ -97,7 +97,7 @@ def _planes(sight: Sight, layout: Layout) -> list[_Plane]:
     return [
         _Plane(names, flat, np.array([(sight.corners[name].x, sight.corners[name].y) for name in names]))
         for names, flat in found
-        if len(names) >= _LEAST
+        if len(names) >= _CORNERS_OF_PLANE
     ]
 
 
@@ -111,7 +111,7 @@ def _principal_distance(camera: str, sights: Sequence[tuple[str, Sight]], planes
             for plane in each]  # fmt: skip
     if not mine:
         size = next(sight.size for name, sight in sights if name == camera)
-        return _USUAL * size[0]
+        return _USUAL_DISTANCE * size[0]
     largest = max(_extent(plane.seen) for _, plane in mine)
     some = [plane for _, plane in mine if _extent(plane.seen) > 0.5 * largest]
     (width, height), _ = mine[0]
@@ -122,7 +122,7 @@ def _principal_distance(camera: str, sights: Sequence[tuple[str, Sight]], planes
         1.0,
     )
     c = float(matrix[0, 0])
-    return c if np.isfinite(c) and _LIKELY[0] < c / width < _LIKELY[1] else _USUAL * width
+    return c if np.isfinite(c) and _LIKELY[0] < c / width < _LIKELY[1] else _USUAL_DISTANCE * width
 
 
 def _matrix(c: float, size: tuple[int, int]) -> Floats:

@@ -32,7 +32,7 @@ _LEADER_AND_TRAILER: Final = 2
 #: So much of the time between two pulses may be spent on a frame: the rest is for packets that are sent again.
 _SHARE: Final = 0.8
 #: Cameras round the delay to their own steps; a share of it.
-_NEAR: Final = 0.05
+_DELAY_ROUNDING: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,7 @@ def _delay(features: Features, name: str, ticks: int) -> bool:
     """Set the delay between packets; whether it is nearly so now. If not, there is none."""
     got = features.set_number(name, ticks)
     least, _, step = features.bounds(name) or (0, 0, 1)
-    if got is not None and abs(got - max(ticks, least)) <= max(_NEAR * ticks, step):
+    if got is not None and abs(got - max(ticks, least)) <= max(_DELAY_ROUNDING * ticks, step):
         return True
     features.set_number(name, 0)
     return False

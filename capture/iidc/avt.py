@@ -18,7 +18,7 @@ _PRESENT, _ON, _RESET = 0x8000_0000, 0x0200_0000, 0x4000_0000
 _LAST_LINE: Final = 0xFFFF  # line -1, as 16 bits with sign
 _LONGEST_US: Final = 0x3FF_FFFF
 _TIMEBASES_US: Final = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-_STEPS: Final = 4095  # of the ordinary shutter
+_SHUTTER_STEPS: Final = 4095  # of the ordinary shutter
 
 
 class AvtRegisters:
@@ -78,7 +78,7 @@ class AvtRegisters:
         if number >= len(_TIMEBASES_US):
             return None
         steps = round((exposure_us - offset_us) / _TIMEBASES_US[number])
-        return steps if 1 <= steps <= _STEPS else None
+        return steps if 1 <= steps <= _SHUTTER_STEPS else None
 
     def _has(self, register: int) -> bool:
         try:

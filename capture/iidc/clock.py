@@ -16,7 +16,7 @@ from rig.clocks import NS_PER_S, NS_PER_US, ClockLatch, DeviceNs, HostNs, host_n
 CYCLE_NS: Final = 125_000
 WRAP_NS: Final = 128 * NS_PER_S
 _CYCLES, _TICKS = 8000, 3072
-_TRIES: Final = 5
+_READINGS: Final = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class CycleTimer:
 
     def latch(self) -> ClockLatch:
         """Read both clocks several times and keep the reading with the shortest round trip."""
-        self._last = min((self._read() for _ in range(_TRIES)), key=lambda latch: latch.round_trip_ns)
+        self._last = min((self._read() for _ in range(_READINGS)), key=lambda latch: latch.round_trip_ns)
         return self._last
 
     def at(self, host: HostNs) -> DeviceNs:

@@ -16,14 +16,14 @@ from photogrammetry.exchange.part import numbers
 from rig.errors import BadInputError
 
 #: Usual columns by the file's ending; a line may end early.
-_USUAL: Final[Mapping[str, tuple[str, ...]]] = {
+_USUAL_COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
     ".csv": ("name", "x", "y", "z", "sx", "sy", "sz"),
     ".obc": ("name", "x", "y", "z", "sx", "sy", "sz"),
     ".phc": ("image", "name", "x", "y", "sx", "sy"),
     ".ior": ("camera", "c", "x0", "y0", "a1", "a2", "r0", "a3", "b1", "b2", "c1", "c2"),
     ".eor": ("image", "camera", "x0", "y0", "z0"),
 }
-ENDINGS: Final = tuple(_USUAL)
+ENDINGS: Final = tuple(_USUAL_COLUMNS)
 #: Other names of columns.
 _SAME: Final = {
     **dict.fromkeys(("point", "id", "nr", "ball", "target", "punkt", "navn"), "name"),
@@ -94,7 +94,7 @@ def read_lines(path: Path) -> tuple[list[Line], tuple[str, ...]]:
     ending = path.suffix.lower()
     file = read_rows(path)
     head, body = _head(file, ending)
-    columns = _USUAL[ending] if head is None else _named(head, ending)
+    columns = _USUAL_COLUMNS[ending] if head is None else _named(head, ending)
     if not body:
         raise BadInputError(f"{path}: is empty; name a file with lines {', '.join(columns)}")
     for row in body:
@@ -131,7 +131,7 @@ def _head(file: Rows, ending: str) -> tuple[Row | None, list[Row]]:
     if body and _is_head(body[0].cells, ending, fewest=0 if len(body[0].cells) >= _FEWEST_NAMED else 1):
         return body[0], body[1:]
     before = [row for row in file.rows[: file.rows.index(body[0])] if row.comment] if body else []
-    fewest = min(_FEWEST_NAMED, len(_USUAL[ending]) - 1)
+    fewest = min(_FEWEST_NAMED, len(_USUAL_COLUMNS[ending]) - 1)
     return next((row for row in reversed(before) if _is_head(row.cells, ending, fewest=fewest)), None), body
 
 
@@ -145,7 +145,7 @@ def _may_be_data(comment: Row, line: Row, separator: str) -> bool:
 def _is_head(words: Sequence[str], ending: str, fewest: int) -> bool:
     """Whether a line names columns: no word of it is a number, and so many are known columns."""
     columns = [_column(word) for word in words]
-    known = set(_USUAL[ending]) | _MORE[ending]
+    known = set(_USUAL_COLUMNS[ending]) | _MORE[ending]
     return not any(is_number(word) for word in words) and sum(column in known for column in columns) >= fewest
 
 
@@ -163,7 +163,7 @@ def _named(head: Row, ending: str) -> tuple[str, ...]:
     while not words[-1]:
         words.pop()
     columns = tuple(_column(word) for word in words)
-    known = (*_USUAL[ending], *sorted(_MORE[ending]))
+    known = (*_USUAL_COLUMNS[ending], *sorted(_MORE[ending]))
     given = {word.lower() for word in words}
     for word, column in zip(words, columns, strict=True):
         if column not in known and (named := _WITH_UNIT.fullmatch(column)) and _column(named[1]) in known:
@@ -183,7 +183,7 @@ def _named(head: Row, ending: str) -> tuple[str, ...]:
         if columns.count(column) > 1:
             both = " and ".join(repr(other) for other, same in zip(words, columns, strict=True) if same == column)
             raise BadInputError(f"{head.place}: columns {both} are the same, {column}; remove all but one")
-    label = _USUAL[ending][0]
+    label = _USUAL_COLUMNS[ending][0]
     if label not in columns:
         raise BadInputError(f"{head.place}: column {label!r} is missing; name it")
     return columns
@@ -394,8 +394,8 @@ def _may_be_one(name: str, more: str, separator: str, row: Row) -> BadInputError
 
 def _line(row: Row, cells: Mapping[str, str], points: Mapping[str, str], ending: str) -> Line:
     labels = {column: _label(word, row.place) for column, word in cells.items() if column in _LABELS}
-    if _USUAL[ending][0] not in labels:
-        raise BadInputError(f"{row.place}: the name is missing; write {', '.join(_USUAL[ending])}")
+    if _USUAL_COLUMNS[ending][0] not in labels:
+        raise BadInputError(f"{row.place}: the name is missing; write {', '.join(_USUAL_COLUMNS[ending])}")
     values = {}
     for column, word in cells.items():
         if column not in _LABELS and (word or column not in SIGMAS):

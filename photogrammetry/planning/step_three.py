@@ -26,7 +26,7 @@ from photogrammetry.planning.sight import in_sight
 from rig.arrays import Flags, Floats
 
 _MOST_STEPS = 30
-_ENOUGH = 1e-3  # of a sigma
+_SETTLED_SIGMAS = 1e-3  # of a sigma
 _DIFFERENCE = 1e-6  # rad and object unit, of central differences; rounding and curvature leave an error of 1e-9
 
 
@@ -151,7 +151,7 @@ def _settled(values: Floats, covariance: Floats, gradient: Callable[[Floats], Fl
     for _ in range(_MOST_STEPS):
         step = np.einsum("iuv,niv->niu", cofactors, gradient(values))
         values = values - step
-        if np.abs(step / sigma).max() < _ENOUGH:
+        if np.abs(step / sigma).max() < _SETTLED_SIGMAS:
             return values
     raise NotConvergedError("a simulated intersection does not settle; the errors are too large for this network")
 

@@ -21,8 +21,8 @@ from photogrammetry.network.diagnosis import NotConvergedError
 from rig.arrays import Floats, Integers
 
 _CHUNK_NUMBERS = 400_000  # of derivatives at a time: they stay in the cache
-_STEPS = 200  # few samples need many steps; only those iterate on
-_ENOUGH = 1e-3  # of a sigma; the scatter of 4000 samples is only known to 1e-2
+_STEPS_MOST = 200  # few samples need many steps; only those iterate on
+_SETTLED_SIGMAS = 1e-3  # of a sigma; the scatter of 4000 samples is only known to 1e-2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,12 +127,12 @@ class StepTwo:
         state = State(*(np.tile(part, (count,) + (1,) * part.ndim) for part in parts))
         before, moved = np.zeros((2, count, len(self.sigma)))
         unsettled = np.arange(count)
-        for number in range(_STEPS):
+        for number in range(_STEPS_MOST):
             step = self._gauss_newton(_taken(state, unsettled), observed.taken(unsettled)) / self.sigma
             move = _extrapolated(step, before[unsettled], moved[unsettled]) if number else step
             self._move(state, unsettled, move * self.sigma)
             before[unsettled], moved[unsettled] = step, move
-            unsettled = unsettled[np.abs(step).max(axis=1) >= _ENOUGH]
+            unsettled = unsettled[np.abs(step).max(axis=1) >= _SETTLED_SIGMAS]
             if not len(unsettled):
                 return state
         raise NotConvergedError("a simulated adjustment does not settle; the errors are too large for this network")

@@ -20,7 +20,7 @@ from photogrammetry.procedures.stages import refuse_absurd
 from photogrammetry.start_values.search import complete
 from rig.errors import BadInputError
 
-_STRONG = 0.95  # correlation beyond which two interior parameters can hardly be told apart
+_CORRELATION_MOST = 0.95  # correlation beyond which two interior parameters can hardly be told apart
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +102,7 @@ def _doubts(a: Adjustment) -> Iterator[str]:
         if zero:
             yield f"camera {camera.name}: not significantly different from zero: {', '.join(zero)}"
         for (k, one), (j, other) in combinations(enumerate(camera.estimate), 2):
-            if abs(correlations[j, k]) >= _STRONG:
+            if abs(correlations[j, k]) >= _CORRELATION_MOST:
                 yield (
                     f"camera {camera.name}: {one} and {other} can hardly be told apart "
                     f"(correlation {correlations[j, k]:.3f}); add images rolled by 90 degrees, or drop one of them"

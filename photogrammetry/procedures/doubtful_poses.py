@@ -29,7 +29,7 @@ from rig.arrays import Floats
 from rig.errors import BadInputError
 from rig.phrase import phrase
 
-_FEWEST: Final = 3  # points of a resection; with so many up to four poses fit exactly
+_POINTS_OF_RESECTION: Final = 3  # points of a resection; with so many up to four poses fit exactly
 #: Two images are exchanged if each lies so much nearer to where the other is given than to where itself is given.
 _NEARER: Final = 0.25
 #: Given poses are in another unit if all distances between them differ by one factor beyond this, ...
@@ -111,7 +111,10 @@ def _ambiguities(a: Adjustment, known: set[str]) -> Iterator[Defect]:
     doubtful = [
         i
         for i, image in enumerate(a.network.images)
-        if counts[i] == _FEWEST and image.estimate and image.name not in known and image.sigma_position is None
+        if counts[i] == _POINTS_OF_RESECTION
+        and image.estimate
+        and image.name not in known
+        and image.sigma_position is None
     ]
     if not doubtful:
         return

@@ -40,11 +40,11 @@ from rig.errors import BadInputError
 WORSE: Final = 25.0
 #: Times that: a reflected pose whose own image says so beforehand is not adjusted.
 _HOPELESS: Final = 20.0
-_FEWEST: Final = 4  # points of an image; three fit several poses exactly (`doubtful_poses`)
+_POINTS_LEAST: Final = 4  # points of an image; three fit several poses exactly (`doubtful_poses`)
 _COMBINED: Final = 3  # images of which all combinations are tried; of more of them each alone, and all together
 _SAME: Final = 0.05  # sigmas of the projection centres by which one minimum differs from itself
 _APART: Final = 1.0  # sigmas from which on two places of an image are two
-_ROUNDS: Final = 4  # a better minimum may lead to one that is better still
+_ROUNDS_MOST: Final = 4  # a better minimum may lead to one that is better still
 
 
 def adjust_least(
@@ -68,7 +68,7 @@ def adjust_least(
         outcome = adjust(network, start, snoop=snoop, family_risk=family_risk)
     except NotConvergedError as error:
         raise naming_unplaced(error, network, start) from error
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS_MOST):
         # what was taken out beside the wrong pose need not be wrong beside the right one: all of it takes part again
         best = least_minimum(outcome.adjustment, given)
         if best is outcome.adjustment:
@@ -144,7 +144,7 @@ def least_minimum(a: Adjustment, given: Network) -> Adjustment:
         a: the network at one minimum.
         given: the network before it got start values.
     """
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS_MOST):
         found = (one.adjustment for one in possible_minima(a, given))
         best = next((one for one in found if len(one.network.points) == len(a.network.points)), a)
         if _same(best, a):
@@ -252,7 +252,7 @@ def _other_pose(a: Adjustment, sightings: Sightings, surveyed: Flags, image: int
     """The reflected pose of an image by its surveyed points; None if there is none that might be as good."""
     points = sightings.points[image]
     known = surveyed[points]
-    if known.sum() < _FEWEST:
+    if known.sum() < _POINTS_LEAST:
         return None
     xyz, xy, sigma = a.state.xyz[points[known]], sightings.xy[image][known], sightings.sigma[image][known]
     camera = IdealCamera(sightings.c_of(image), a.state.position[image], a.state.rotation[image])

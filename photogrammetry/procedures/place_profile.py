@@ -20,7 +20,7 @@ from rig.arrays import Floats
 #: Sigmas to the ends of the interval in which a place lies for sure.
 _REACH: Final = 5
 #: The square sum must rise as far from the optimum as over so many sigmas of the linearisation: 6e-5 lies beyond.
-_LEAST: Final = 4.0
+_RISE_LEAST_SIGMAS: Final = 4.0
 #: The equations are linear over a smaller part of the distance to the points than this.
 _LINEAR: Final = 0.1
 #: Sigma by which the place is held, in sigmas of it, and of the axes that are free, in distances.
@@ -60,7 +60,7 @@ def _rises(a: Adjustment, image: int, axis: int, step: float, distance: float) -
         except (NotConvergedError, NotSolvableError):
             return False  # nothing holds the others there
     rise = a.problem.square_sum(state) - a.equations.square_sum
-    return bool(rise >= (_LEAST * a.scale) ** 2)
+    return bool(rise >= (_RISE_LEAST_SIGMAS * a.scale) ** 2)
 
 
 def _held(a: Adjustment, image: int, axis: int, place: Floats, distance: float) -> Problem:

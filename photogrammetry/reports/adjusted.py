@@ -24,7 +24,7 @@ from photogrammetry.reports.record.strength import coverage_parts
 from photogrammetry.reports.result_extras import joint_covariance
 from photogrammetry.reports.summary import summarise
 
-_STRONG = 0.9  # larger correlations are listed
+_CORRELATION_LISTED = 0.9  # larger correlations are listed
 _SHOWN = 20  # listed correlations, at most
 _POSE = ("X0", "Y0", "Z0", "angle 1", "angle 2", "angle 3")
 
@@ -124,13 +124,13 @@ def _correlations(a: Adjustment) -> tuple[str | Table, ...]:
         matrix = correlation(a.covariance(columns[known]))
         chosen = [name for name, there in zip(names, known, strict=True) if there]
         for (i, one), (j, other) in combinations(enumerate(chosen), 2):
-            if abs(matrix[i, j]) >= _STRONG:
+            if abs(matrix[i, j]) >= _CORRELATION_LISTED:
                 found[one, other] = float(matrix[i, j])
     if not found:
-        return (f"None of interior orientation and poses reaches {_STRONG:g}.",)
+        return (f"None of interior orientation and poses reaches {_CORRELATION_LISTED:g}.",)
     strongest = sorted(found.items(), key=lambda item: -abs(item[1]))
     rows = tuple((one, other, f"{value:.3f}") for (one, other), value in strongest[:_SHOWN])
-    words = f"{len(found)} among interior orientation and pose reach {_STRONG:g}"
+    words = f"{len(found)} among interior orientation and pose reach {_CORRELATION_LISTED:g}"
     return (f"{words}; the strongest:" if len(found) > _SHOWN else f"{words}:", Table(("one", "other", "r"), rows))
 
 

@@ -17,7 +17,7 @@ from photogrammetry.start_values.image_block import ImageBlock
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 
-_STEPS = 30
+_STEPS_MOST = 30
 _SETTLED = 1e-14  # relative decrease of the square sum that ends the iteration
 _GIVEN_UP = 1e8  # damping at which no shorter step decreases it
 _ROBUST_ROUNDS = 8
@@ -184,7 +184,7 @@ def _improved(ties: _Ties, transform: Similarity) -> tuple[Similarity, float]:
     """Damped Gauss-Newton; parameters that the ties do not determine stay."""
     residuals, jacobian = ties.linearised(transform)
     damping = 1e-3
-    for _ in range(_STEPS):
+    for _ in range(_STEPS_MOST):
         if not ties.fixes_scale:
             jacobian[:, 0] = 0.0
         normal = jacobian.T @ jacobian

@@ -24,7 +24,7 @@ _OUTLIER = 4.0  # times the median residual: a resection leaves out points with 
 _GOOD_SHARE, _LEAST_POINTS = 0.8, 6  # but keeps this share of the points, and at least so many
 _CAUTION = 30.0  # poses are start values, so rays are that much less accurate than the image points
 _POLISH_ROUNDS = 2
-_USUAL, _USUAL_SQUARE = 0.8, 3.219  # quantile of squared residuals, and its value for two standard normal numbers
+_QUANTILE, _QUANTILE_SQUARE = 0.8, 3.219  # quantile of squared residuals, and its value for two standard normal numbers
 _MIN_COMMON = 5
 _ORIENTED = 16  # pairs whose relative orientation is computed
 _TRIED = 3  # pairs from which a trial block is grown
@@ -121,7 +121,7 @@ class ImageBlock:
     def typical_residual(self) -> float:
         """A robust `residual`, from the size that four fifths of the residuals do not exceed."""
         every = self._squares()
-        return float(np.sqrt(2.0 * np.quantile(every, _USUAL) / _USUAL_SQUARE)) if len(every) else np.inf
+        return float(np.sqrt(2.0 * np.quantile(every, _QUANTILE) / _QUANTILE_SQUARE)) if len(every) else np.inf
 
     def _squares(self) -> Floats:
         """Squared residuals of all rays to known points over their variances."""

@@ -24,13 +24,13 @@ from rig.errors import BadInputError
 _SETS = 16  # sets of five points
 _STARTS = 12  # candidates that are refined, at most
 _FIRST_STEPS, _FIRST_KEPT = 5, 5  # with many points only the best few are refined beyond the first steps
-_NEAR = 0.02  # rad: of candidates closer than that only the best is refined
-_MANY = 10  # points, from here on "many" for _FIRST_STEPS
+_SAME_RAD = 0.02  # rad: of candidates closer than that only the best is refined
+_MANY_POINTS = 10  # points, from here on "many" for _FIRST_STEPS
 _ENOUGH_TO_JUDGE = 20  # points; with fewer none is left out, the rest would fit a wrong solution too easily
 _GOOD_SHARE = 0.75  # of the points are taken as good in any case
 _OUTLIER = 6.0  # times the median residual: larger ones are blunders
 _WORTH = 100.0  # blunders are left out only if that divides the square sum by more than this
-_STEPS = 30
+_STEPS_MOST = 30
 _SETTLED = 1e-9  # relative decrease of the square sum that ends the iteration
 _GIVEN_UP = 1.0  # damping at which a start without any decrease is given up
 _EPIPOLE = 1e-9  # least length of a derivative: guards points that lie in both epipoles
@@ -118,12 +118,12 @@ def _robust_minima(rotations: Floats, bases: Floats, u: Floats, v: Floats) -> tu
     if good.all():
         return good, minima
     without = _minima(rotations, u[good], v[good])
-    again = _iterate(*without[:2], u, v, _STEPS)
+    again = _iterate(*without[:2], u, v, _STEPS_MOST)
     rotations, bases, sums = (np.concatenate(both) for both in zip(minima, again, strict=True))
     if without[2].min() * _WORTH > sums.min():
         return np.ones(len(u), bool), (rotations, bases, sums)
     good = _good_points(*without[:2], u, v)
-    return good, _iterate(*without[:2], u[good], v[good], _STEPS)
+    return good, _iterate(*without[:2], u[good], v[good], _STEPS_MOST)
 
 
 def _minima(rotations: Floats, u: Floats, v: Floats) -> _Minima:
@@ -132,12 +132,12 @@ def _minima(rotations: Floats, u: Floats, v: Floats) -> _Minima:
     sums = (_conditions(rotations, bases, u, v)[0] ** 2).sum(axis=1)
     best = _distinct_starts(rotations, sums) if len(u) > 5 else list(range(len(rotations)))
     rotations, bases = rotations[best], bases[best]
-    if len(u) >= _MANY:
+    if len(u) >= _MANY_POINTS:
         rotations, bases, sums = _iterate(rotations, bases, u, v, _FIRST_STEPS)
         sums = np.where(_possible(rotations, bases, u, v), sums, np.inf)
         best = _distinct_starts(rotations, sums)[:_FIRST_KEPT]
         rotations, bases = rotations[best], bases[best]
-    return _iterate(rotations, bases, u, v, _STEPS)
+    return _iterate(rotations, bases, u, v, _STEPS_MOST)
 
 
 def _good_points(rotations: Floats, bases: Floats, u: Floats, v: Floats) -> Flags:
@@ -166,7 +166,7 @@ def _distinct_starts(rotations: Floats, sums: Floats) -> list[int]:
     """Indices of the best candidates, one of each group of nearly equal rotations."""
     kept: list[int] = []
     for i in np.argsort(sums, kind="stable"):
-        if not (np.abs(rotations[kept] - rotations[i]).max(axis=(1, 2)) < _NEAR).any():
+        if not (np.abs(rotations[kept] - rotations[i]).max(axis=(1, 2)) < _SAME_RAD).any():
             kept.append(int(i))
             if len(kept) == _STARTS:
                 break

@@ -27,11 +27,11 @@ _SAME_TURN = 0.02  # rad: poses closer than that are one solution
 _SAME_EXACT = 1e-5  # rad: the same for three points, whose poses are exact
 _ROUNDING = 1e-7  # of c: smaller residuals are rounding
 _AMBIGUOUS = 4.0  # ratio of square sums below which a second pose remains possible
-_FEW = 5  # points that may have a second pose without lying in a plane
+_POINTS_OF_TWO_POSES = 5  # points that may have a second pose without lying in a plane
 _MAX_STEPS = 30
 _DAMPING = 1e-3
 _TOO_DAMPED = 1e12
-_ENOUGH = 1e-9  # relative decrease of the square sum
+_SETTLED_DECREASE = 1e-9  # relative decrease of the square sum
 _EXACT = 1e-12  # of c: with smaller residuals the iteration ends
 
 
@@ -234,7 +234,7 @@ def second_pose(camera: IdealCamera, points: Floats, xy: Floats) -> RefinedPose 
     mirrored = k - 2.0 * ((k - k.mean(axis=0)) @ mean)[:, None] * mean
     fit = fit_similarity(mirrored, points, scale=1.0)
     starts = [IdealCamera(camera.c, fit.translation, fit.rotation)]
-    if len(points) <= _FEW:
+    if len(points) <= _POINTS_OF_TWO_POSES:
         measured = unit_rays(xy, camera.c)
         of_three = [p for t in _triples(points) for p in _three_points(points[t], measured[t], camera.c)]
         candidates = _distinct([RefinedPose(p, _fit(p, points, measured)) for p in of_three], _SAME_TURN)
@@ -271,7 +271,7 @@ def refine_pose(camera: IdealCamera, points: Floats, xy: Floats, steps: int = _M
         candidate = IdealCamera(camera.c, best.camera.X0 + step[:3], turned)
         square_sum = _square_sum(candidate, points, xy)
         if square_sum < best.square_sum:
-            settled = square_sum > (1 - _ENOUGH) * best.square_sum
+            settled = square_sum > (1 - _SETTLED_DECREASE) * best.square_sum
             best, damping = RefinedPose(candidate, square_sum), damping / 10
             if settled:
                 break

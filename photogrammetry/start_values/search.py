@@ -22,7 +22,7 @@ from photogrammetry.start_values.sightings import Sightings, reduce_observations
 from rig.arrays import Floats
 from rig.errors import BadInputError
 
-_FAR = 0.1  # of the block's extent: approximate coordinates that are further off are ignored
+_FAR_OFF_SHARE = 0.1  # of the block's extent: approximate coordinates that are further off are ignored
 _FITS = 3.0  # residuals over their sigmas: with smaller ones c is right
 _FACTORS = (1.0, 0.5, 2.0, 0.25)  # tried on c: trial adjustments converge best from a c that is too short
 _COMBINED, _ENOUGH_IMAGES = 3, 3  # all combinations for up to three cameras that have fewer than three images
@@ -168,7 +168,7 @@ def _filled_point(point: Point, xyz: Floats, extent: float) -> Point:
     """Given coordinates stay, except approximate ones of a tie point that are far from where the images put it."""
     if point.xyz is None:
         return replace(point, xyz=xyz)
-    if point.role is Role.TIE and np.linalg.norm(point.xyz - xyz) > _FAR * extent:
+    if point.role is Role.TIE and np.linalg.norm(point.xyz - xyz) > _FAR_OFF_SHARE * extent:
         return replace(point, xyz=xyz)
     return point
 

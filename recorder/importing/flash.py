@@ -10,7 +10,7 @@ _TO_SIGMA: Final = 1.4826
 #: A flash is a rise of the mean brightness by more than so many standard deviations of its changes, ...
 _SIGMAS: Final = 10.0
 #: ... and by more than this share of white: the noise of a mean over all pixels is far below one grey value.
-_LEAST: Final = 1e-3
+_RISE_LEAST: Final = 1e-3
 #: Another rise that is more than this share of the largest one may be the flash as well.
 _RIVAL: Final = 0.5
 
@@ -33,7 +33,7 @@ def flashes(brightness: NDArray[np.float64]) -> list[int]:
         return []
     rises = np.diff(brightness[there])
     spread = _TO_SIGMA * float(np.median(np.abs(rises - np.median(rises))))
-    limit = max(_SIGMAS * spread, _LEAST)
+    limit = max(_SIGMAS * spread, _RISE_LEAST)
     beyond = np.flatnonzero(rises > limit)
     groups = np.split(beyond, np.flatnonzero(np.diff(beyond) > 1) + 1) if len(beyond) else []
     heights = [float(rises[group].sum()) for group in groups]

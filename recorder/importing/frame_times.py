@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 #: A frame comes at its time to this share of the period, beside the rounding of the file.
 _EARLY_OR_LATE: Final = 0.25
 #: With that, it can still be told from the next one.
-_MOST: Final = 0.4
+_PERIODS_OFF_MOST: Final = 0.4
 #: A step that is shorter than so many usual ones is one.
 _ONE: Final = 1.5
 
@@ -33,7 +33,7 @@ def frame_numbers(ticks: NDArray[np.int64]) -> tuple[NDArray[np.int64], float] |
         return None
     period = float(steps[steps < _ONE * usual].mean())
     whole = np.rint(steps / period).astype(np.int64)
-    reach = min(_EARLY_OR_LATE + 1.0 / period, _MOST)
+    reach = min(_EARLY_OR_LATE + 1.0 / period, _PERIODS_OFF_MOST)
     if whole.min() < 1 or np.abs(steps / period - whole).max() > reach or whole.sum() >= 2 * len(ticks):
         return None
     return np.concatenate(([1], 1 + np.cumsum(whole))), period

@@ -21,7 +21,7 @@ _WALL: Final = 110.0
 _FINE: Final = 4  # rays along a pixel's side, while the board is still
 _OUTLINE: Final = np.array([(-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0)], dtype=float)
 _SPARE_PX: Final = 8  # around the corners of a sheet: its sides are bent by the lens
-_STEPS: Final = 20  # of finding the ideal place that a lens shows at a given one, at most
+_IDEAL_PLACE_STEPS: Final = 20  # of finding the ideal place that a lens shows at a given one, at most
 _ENOUGH_PX: Final = 1e-4  # of a step: below what single precision tells apart at the edge of the largest pictures
 
 
@@ -147,7 +147,7 @@ def _ideal(camera: Projection) -> Floats:
     ideal: Floats = wanted.copy()
     if camera.lens is not None:
         reach = float(np.hypot(camera.width, camera.height))
-        for _ in range(_STEPS):
+        for _ in range(_IDEAL_PLACE_STEPS):
             off = wanted - camera.lens.bend(ideal, reach)
             ideal += off
             if np.abs(off).max() < _ENOUGH_PX:

@@ -23,7 +23,7 @@ _KEY, _WANTS_ANSWER, _BY_BROADCAST = 0x42, 0x01, 0x10
 _DISCOVERY, _FORCEIP, _READ_REGISTER, _WRITE_REGISTER = 0x0002, 0x0004, 0x0080, 0x0082
 _CONTROL_CHANNEL_PRIVILEGE = 0x0A00
 _CONTROLLED = 0b11  # exclusive access or control access is taken
-_TRIES = 3
+_REQUESTS_MOST = 3
 _EVERYBODY: Final = "255.255.255.255"
 _DISCOVERY_BYTES = 0xF8
 _SEARCH_S = 1.0  # section 14.1: a camera waits up to a second before it answers, so that not all answer at once
@@ -185,9 +185,9 @@ def _ask(channel: socket.socket, command: int, payload: bytes, timeout_s: float)
 
 def _answer(channel: socket.socket, command: int, payload: bytes, timeout_s: float) -> bytes | None:
     """The answer, None if there is none; repeats the request, since a datagram may get lost."""
-    for request_id in range(1, _TRIES + 1):
+    for request_id in range(1, _REQUESTS_MOST + 1):
         channel.send(_REQUEST.pack(_KEY, _WANTS_ANSWER, command, len(payload), request_id) + payload)
-        deadline = time.monotonic() + timeout_s / _TRIES
+        deadline = time.monotonic() + timeout_s / _REQUESTS_MOST
         while (left := deadline - time.monotonic()) > 0:
             channel.settimeout(left)
             try:

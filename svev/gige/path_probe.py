@@ -17,13 +17,13 @@ _CONTROL, _STREAM_PORT, _PACKET_SIZE, _STREAM_ADDRESS = 0x0A00, 0x0D00, 0x0D04, 
 _CONTROL_ACCESS: Final = 0b10
 _FIRE, _DO_NOT_FRAGMENT = 1 << 31, 1 << 30
 _IP_UDP_BYTES: Final = 28
-_TRIES: Final = 3
+_PACKETS_TRIED: Final = 3
 _ANSWER_S: Final = 0.5
 #: A packet takes less than a millisecond.
 _PACKET_S: Final = 0.2
 #: What every network takes, and the largest packet of an Ethernet without jumbo frames.
 SMALL: Final = 1400
-_USUAL: Final = 1500
+_USUAL_BYTES: Final = 1500
 
 
 class CameraRefusesError(Exception):
@@ -48,7 +48,7 @@ def largest_packet(address: str, wanted: int) -> int | None:
             with _controlled(channel), _receiver(channel) as receiver:
                 if not _comes(channel, receiver, SMALL):
                     return None
-                return next((size for size in (wanted, _USUAL) if _comes(channel, receiver, size)), SMALL)
+                return next((size for size in (wanted, _USUAL_BYTES) if _comes(channel, receiver, size)), SMALL)
         except CameraRefusesError:
             return None
 
@@ -76,7 +76,7 @@ def _receiver(channel: socket.socket) -> Iterator[socket.socket]:
 
 def _comes(channel: socket.socket, receiver: socket.socket, size: int) -> bool:
     """Whether a test packet of so many bytes arrives; a single one may be lost by chance."""
-    for _ in range(_TRIES):
+    for _ in range(_PACKETS_TRIED):
         if not write_register(channel, _PACKET_SIZE, _FIRE | _DO_NOT_FRAGMENT | size, _ANSWER_S):
             return False  # the camera itself makes no packets of this size
         deadline = time.monotonic() + _PACKET_S

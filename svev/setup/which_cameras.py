@@ -12,7 +12,7 @@ from svev.setup.search import Found
 from svev.setup.words import said
 
 _KEEP: Final = "keep"
-_MOST: Final = 8
+_CAMERAS_MOST: Final = 8
 #: Looks for cameras: the addresses to ask, None for all; and whether to look for FireWire ones too.
 Look = Callable[[tuple[str, ...] | None, bool], Found]
 
@@ -76,7 +76,7 @@ class WhichCameras:
         some_answer = len(silent) < len(known)
         for camera in silent if some_answer else ():
             self._dialog.say("of_today_silent", camera=camera.option)
-        usual = [each.address for each in known] if some_answer else addresses[:_MOST]
+        usual = [each.address for each in known] if some_answer else addresses[:_CAMERAS_MOST]
         shown = _KEEP if some_answer and silent else " ".join(str(addresses.index(each) + 1) for each in usual)
 
         def numbers(text: str) -> tuple[Seen, ...] | None:
@@ -84,8 +84,10 @@ class WhichCameras:
                 return None
             words = text.replace(",", " ").split()
             chosen = [int(word) for word in words if word.isdecimal() and 1 <= int(word) <= len(addresses)]
-            if not words or len(chosen) < len(words) or len(set(chosen)) < len(chosen) or len(chosen) > _MOST:
-                raise BadInputError(f"{text}: give numbers from 1 to {len(addresses)}, each once, {_MOST} at most")
+            if not words or len(chosen) < len(words) or len(set(chosen)) < len(chosen) or len(chosen) > _CAMERAS_MOST:
+                raise BadInputError(
+                    f"{text}: give numbers from 1 to {len(addresses)}, each once, {_CAMERAS_MOST} at most"
+                )
             return tuple(found.cameras[number - 1] for number in chosen)
 
         chosen = self._dialog.ask("cameras", "--camera", None, shown, numbers)
@@ -120,7 +122,7 @@ class WhichCameras:
         """
         cameras = [camera_of(text, self._today) for text in texts]
         taken = {each.name for each in cameras}
-        free = (name for number in range(1, 2 * _MOST) if (name := f"K{number}") not in taken)
+        free = (name for number in range(1, 2 * _CAMERAS_MOST) if (name := f"K{number}") not in taken)
         named = tuple(each if each.name else each.called(next(free)) for each in cameras)
         for values in ([each.name for each in named], [each.address for each in named]):
             for value in values:

@@ -147,6 +147,6 @@ def test_nothing_is_mixed_whatever_the_pulses(seed: int) -> None:
 
 
 def test_more_offsets_than_can_be_tried_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("triggering.alignment._MOST", 10)
+    monkeypatch.setattr("triggering.alignment._OFFSETS_MOST", 10)
     with pytest.raises(BadInputError, match=r"could be the same at more than 10 offsets .* by NTP or PTP"):
         align(Log(EVEN[:100]).train, Log(EVEN[:100], seed=2).train)

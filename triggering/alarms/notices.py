@@ -8,7 +8,7 @@ from rig.phrase import Phrase, phrase
 from triggering.sources.choice import TriggerSource
 
 #: A figure is given again when it is so many times as large.
-_AGAIN: Final = 2
+_TOLD_AGAIN_FACTOR: Final = 2
 #: The lateness of pulses is known when so many have been made.
 _KNOWN_PULSES: Final = 100
 
@@ -46,7 +46,7 @@ class SpreadTeller:
             health: state of the pairing.
         """
         spread_us = health.spread_max_us
-        if self._told_us is not None and (spread_us <= _AGAIN * self._told_us):
+        if self._told_us is not None and (spread_us <= _TOLD_AGAIN_FACTOR * self._told_us):
             return None
         if len(health.cameras) > 1 and spread_us == 0:
             return None  # no pulse has frames of two cameras yet
@@ -75,7 +75,7 @@ class LatenessTeller:
             made: the pulses so far.
         """
         said = []
-        if made.skipped >= max(1, _AGAIN * self._told_skipped):
+        if made.skipped >= max(1, _TOLD_AGAIN_FACTOR * self._told_skipped):
             self._told_skipped = made.skipped
             text = (
                 "{line}: {skipped} pulses were left out so far, since the computer would have made them too late: "
@@ -86,7 +86,7 @@ class LatenessTeller:
         if (
             worst is not None
             and made.made >= _KNOWN_PULSES
-            and (self._told_us is None or worst > _AGAIN * self._told_us)
+            and (self._told_us is None or worst > _TOLD_AGAIN_FACTOR * self._told_us)
         ):
             self._told_us = worst
             text = (

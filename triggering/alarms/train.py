@@ -31,7 +31,7 @@ _MAD: Final = 1.4826
 #: What has drifted is back when it is within this share of the limit.
 _BACK: Final = 0.5
 #: A spread of this share of the period is a warning: nothing that one edge exposes lies so far apart.
-_SPREAD: Final = 0.05
+_SPREAD_SHARE: Final = 0.05
 #: So many pulses are needed to judge the spread.
 _SPREAD_PULSES: Final = 24
 
@@ -143,7 +143,7 @@ def spread(health: Health, names: Sequence[str]) -> Alarm | None:
     if pairing.seen < _SPREAD_PULSES:
         return None
     clocks = sorted(camera.clock_uncertainty_us or 0.0 for camera in pairing.cameras)
-    limit_us = max(_SPREAD * pairing.period_us, sum(clocks[-2:]))
+    limit_us = max(_SPREAD_SHARE * pairing.period_us, sum(clocks[-2:]))
     if pairing.spread_usual_us <= limit_us:
         return None
     share = round(100 * pairing.spread_usual_us / pairing.period_us)

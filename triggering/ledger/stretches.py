@@ -17,7 +17,7 @@ from triggering.ledger.arrivals import FRAMES, RHYTHM
 #: The soonest of n arrivals lies beyond half a period by chance with a probability of exp(-n p / 2 m), where m is their
 #: mean excess over the soonest possible one and p the period, if they are exponential, and less often if they are
 #: bounded. n p / m must be so large that this is below 1e-4.
-_SURE: Final = 18.4
+_FRAMES_NEAR_LEAST: Final = 18.4
 
 
 @dataclass(slots=True)
@@ -162,7 +162,7 @@ def shift_of(usual: Run, run: Run) -> int | None:
     if not run.frames:
         return None
     mean_excess = max(each.late / each.frames - each.soonest for each in (usual, run))
-    if min(usual.frames, run.frames) * run.nearest < _SURE * mean_excess:
+    if min(usual.frames, run.frames) * run.nearest < _FRAMES_NEAR_LEAST * mean_excess:
         return None
     soonest = round((run.soonest - usual.soonest) / run.nearest)
     mean = round((run.late / run.frames - usual.late / usual.frames) / run.nearest)

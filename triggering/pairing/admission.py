@@ -14,7 +14,7 @@ from triggering.pairing.other_cameras import OtherCameras
 from triggering.timeline.pulse_train import PulseTrain
 
 #: So many cameras at least have to show a change for it to be one of the link or the computer.
-_SEVERAL: Final = 2
+_CAMERAS_LEAST: Final = 2
 
 
 class Admission:
@@ -78,7 +78,7 @@ class Admission:
         changes = [change for times in there if (change := times.latency_change_ns) is not None]
         since = [times.plausibility.doubted for times in there]
         period = self._train.period_ns
-        at_once = len(changes) == len(there) >= _SEVERAL and min(since) > 0 and max(since) - min(since) <= LASTING
+        at_once = len(changes) == len(there) >= _CAMERAS_LEAST and min(since) > 0 and max(since) - min(since) <= LASTING
         if at_once and min(map(abs, changes)) > period / 2 and max(changes) - min(changes) < period / 4:
             for times in there:
                 times.learn_latencies_anew()

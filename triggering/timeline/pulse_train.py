@@ -31,7 +31,7 @@ CLOCKS_NS: Final = 500_000
 _SPREAD_NS: Final = 2_500_000
 #: Afterwards: so many times the spread that this share of the pulses keeps. The spread of trigger times that are even
 #: over an interval has its 90 % point at 0.8 of it for three cameras, at 0.68 for two; the rest is for few pulses.
-_USUAL: Final = 0.9
+_SHARE_KEPT: Final = 0.9
 _SPREADS: Final = 3.0
 #: The spread is learned from so many pulses, and anew after as many.
 _LEARN_EVERY: Final = 24
@@ -171,7 +171,7 @@ class PulseTrain:
     @property
     def spread_usual_ns(self) -> int:
         """The spread that nine in ten of the recent sets keep."""
-        return sorted(self._spreads)[int(_USUAL * (len(self._spreads) - 1))] if self._spreads else 0
+        return sorted(self._spreads)[int(_SHARE_KEPT * (len(self._spreads) - 1))] if self._spreads else 0
 
     @property
     def spread_max_ns(self) -> int:

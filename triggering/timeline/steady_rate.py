@@ -10,7 +10,7 @@ from rig.health import PairingHealth
 
 #: Intervals are of one train if they agree with the last one to this share of it.
 AGREE: Final = 0.05
-_LEAST: Final = 2
+_INTERVALS_LEAST: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ def steady_rate(times: Sequence[HostNs]) -> SteadyRate | None:
         if abs(interval - intervals[-1]) > AGREE * intervals[-1]:
             break
         agreeing += 1
-    if agreeing < _LEAST:
+    if agreeing < _INTERVALS_LEAST:
         return None
     span_ns = times[-1] - times[-1 - agreeing]
     return SteadyRate(NS_PER_S * agreeing / span_ns, _error(agreeing))

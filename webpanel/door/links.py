@@ -38,7 +38,7 @@ _MINUTE_S: Final = 60
 #: A link is given again for this part of its time, one hour of a day.
 _SAME: Final = 24
 #: So many links are known; of more than that the oldest cannot be taken back any more.
-_MOST: Final = 5000
+_LINKS_MOST: Final = 5000
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +166,7 @@ class Links:
     def _keep(self) -> None:
         """Forget those that have ended and, of too many, the oldest that were not taken back."""
         known = [link for link in self._made.values() if self.left_s(link.minute * float(_MINUTE_S))]
-        surplus = [link for link in known if not link.taken_back][: max(0, len(known) - _MOST)]
+        surplus = [link for link in known if not link.taken_back][: max(0, len(known) - _LINKS_MOST)]
         self._made = {(link.recording, link.minute): link for link in known if link not in surplus}
         if self._file is not None:
             self._file.keep(self._made.values())

@@ -13,7 +13,7 @@ from rig.errors import BadInputError
 from rig.phrase import phrase
 
 #: Fewer common points or figures say nothing of a scatter.
-_FEWEST: Final = 3
+_COMMON_LEAST: Final = 3
 _BY_HAND: Final = frozenset({MarkSource.HAND, MarkSource.REFINED})
 
 #: Figures by pulse.
@@ -40,7 +40,7 @@ def repeatability(marks: Mapping[str, Iterable[tuple[Key, Entered]]], figures: M
     things = {}
     for thing in dict.fromkeys(key.thing for key in common):
         keys = [key for key in common if key.thing == thing]
-        if len(keys) >= _FEWEST:
+        if len(keys) >= _COMMON_LEAST:
             xy = np.array([[places[operator][key] for key in keys] for operator in operators])
             sigma, bias = _agreement(xy)
             pairs = {o: (float(b[0]), float(b[1])) for o, b in zip(operators, bias, strict=True)}
@@ -52,7 +52,7 @@ def repeatability(marks: Mapping[str, Iterable[tuple[Key, Entered]]], figures: M
                 "hand_little_common",
                 "{operators} have measured fewer than {fewest} points in common: measure the same pulses",
                 operators=", ".join(operators),
-                fewest=_FEWEST,
+                fewest=_COMMON_LEAST,
             )
         )
     worst = max(things, key=lambda thing: things[thing].sigma_px, default=None)
@@ -78,7 +78,7 @@ def _figures(operators: Sequence[str], figures: Mapping[str, Figures]) -> dict[s
     found = {}
     for name in names:
         both = [pulse for pulse in pulses if all(name in figures[operator][pulse] for operator in operators)]
-        if len(both) >= _FEWEST:
+        if len(both) >= _COMMON_LEAST:
             values = np.array([[[figures[operator][pulse][name]] for pulse in both] for operator in operators])
             sigma, bias = _agreement(values)
             by_operator = {o: float(b[0]) for o, b in zip(operators, bias, strict=True)}

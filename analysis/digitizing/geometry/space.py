@@ -24,7 +24,7 @@ from rig.phrase import Phrase, phrase
 #: Test values beyond which a ray is named: one sound ray in a thousand.
 _NAMED_W: Final = 3.29
 #: Probability from which the side check is believed.
-_SURE: Final = 0.99
+_SURE_OF_SIDE: Final = 0.99
 _SKIS: Final = {
     "right": phrase("hand_right_ski", "right ski"),
     "left": phrase("hand_left_ski", "left ski"),
@@ -245,7 +245,7 @@ def _sides(system: CameraSystem, pulse: PulseMeasurements) -> SideCheck | None:
     sigma = float(np.sqrt(np.mean([np.mean(ski.sigma**2) + ski.common**2 for line in skis for ski in line])))
     right, left = (fit_image_lines(xy[i][None], sigma, seen=seen[i][None]) for i in range(len(SIDES)))
     check = check_sides([system[name].ideal() for name in three], left, right)
-    if not check.fits[0] or check.confidence[0] < _SURE:
+    if not check.fits[0] or check.confidence[0] < _SURE_OF_SIDE:
         # The check takes the orientations for exact: beside their errors lines of sound measurements may fit badly.
         unknown = phrase("hand_sides_unknown", "left and right cannot be told by these lines: compare by eye")
         return SideCheck(ok=None, said=unknown)

@@ -21,11 +21,11 @@ REACH_PX: Final = 3.5  #: beyond the outer borders that are fitted: a blur's bor
 _BLUR, _BLUR_SPREAD = 0.65, 0.5  # px, of lens and pixel; weak prior of its logarithm
 _BLURS = np.log(0.3), np.log(3.0)
 _ROBUST = 3.0  # times the usual misfit at which a section counts half
-_STEPS, _ENOUGH = 25, 1e-4  # iterations; px
+_STEPS_MOST, _SETTLED_PX = 25, 1e-4  # iterations; px
 _LARGEST_STEP = 1.0  # px, and of the logarithm
 _THINNEST = 1.0  # px; borders that are nearer to each other are one behind the blur
 _MOVED = 0.5  # px from the start: then the pixels around the border are others
-_FEWEST = 6  # pixels of a section
+_PIXELS_LEAST = 6  # pixels of a section
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +64,7 @@ class Strip:
         """Only the pixels between two lines, each (2,) u at start and end."""
         line_low, line_high = (line[0] + (line[1] - line[0]) * self.t for line in (low, high))
         there = self.there * (self.u >= line_low) * (self.u <= line_high)
-        enough = there.sum(axis=1) >= _FEWEST
+        enough = there.sum(axis=1) >= _PIXELS_LEAST
         return replace(self, **{k: getattr(self, k)[enough] for k in ("t", "u", "grey")}, there=there[enough])
 
 
@@ -142,13 +142,13 @@ def fit_borders(pixels: Strip, ends: Floats, noise: float) -> Borders | None:
 def _fitted(pixels: Strip, ends: Floats, noise: float) -> Borders | None:
     """As `fit_borders`, with the pixels around the start."""
     near = pixels.within(ends[0] - REACH_PX, ends[-1] + REACH_PX)
-    if near.there.sum() < 2 * _FEWEST:
+    if near.there.sum() < 2 * _PIXELS_LEAST:
         return None
     theta = np.append(ends.ravel(), np.log(_BLUR))
     weight, damping = np.ones(len(near.t)), 1e-3
     seen = _seen(near, theta, noise)
     cost, equations = _cost(theta, seen, weight), _equations(near, theta, seen, weight, noise)
-    for _ in range(_STEPS):
+    for _ in range(_STEPS_MOST):
         normal = equations[0].copy()
         normal.flat[:: len(normal) + 1] *= 1 + damping
         step = np.clip(np.linalg.solve(normal, equations[1]), -_LARGEST_STEP, _LARGEST_STEP)
@@ -159,7 +159,7 @@ def _fitted(pixels: Strip, ends: Floats, noise: float) -> Borders | None:
             theta, seen, damping = trial, new, damping / 5
             weight = _weights(seen)
             cost, equations = _cost(theta, seen, weight), _equations(near, theta, seen, weight, noise)
-            if np.abs(step[:-1]).max() < _ENOUGH:
+            if np.abs(step[:-1]).max() < _SETTLED_PX:
                 break
         else:
             damping *= 10

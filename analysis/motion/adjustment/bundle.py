@@ -23,7 +23,7 @@ from rig.arrays import Flags, Floats
 _RANK: Final = 1e-12  # of the greatest eigenvalue of the scaled covariance
 _COMMON_SIGMA: Final = 1e-4  # pulse intervals, of the mean lateness where it is given by definition
 _SETTLED: Final = 0.01  # of a sigma: greatest step of O that ends the iteration
-_FAR: Final = 10.0  # times the median distance from approximate states
+_FAR_FACTOR: Final = 10.0  # times the median distance from approximate states
 MEDIAN: Final = float(chdtri(2, 0.5))  #: of the weighted square sum of a group
 
 
@@ -110,7 +110,7 @@ def near(model: Model, states: Floats, shared: Floats) -> Flags:
     v = _linearised(model, shared, channels).v
     seen, square = model.observed.seen, (v**2).sum(axis=-1)
     usual = np.array([np.median(square[:, :, g][seen[:, :, g]]) if seen[:, :, g].any() else 0.0 for g in range(6)])
-    return np.asarray(seen & (square <= _FAR**2 * np.maximum(usual, MEDIAN)))
+    return np.asarray(seen & (square <= _FAR_FACTOR**2 * np.maximum(usual, MEDIAN)))
 
 
 def settled(adjusted: Adjusted, most: int) -> Adjusted:

@@ -28,8 +28,8 @@ _FLOOR: Final = 1e-4  # of an observation's variance: residuals that are less fr
 _PSEUDO: Final = 10.0  #: observations that a factor of 1 counts as
 _POINTS, _SKIS = slice(0, len(POINTS)), slice(len(POINTS), len(GROUPS))
 _RUN_S: Final = LASTING_S / 2 - 1e-3  # to each side of a measurement; less 1 ms, since times are rounded
-_SEVERAL: Final = 2  # gross errors that are no coincidence: one in ten thousand rays is one by chance
-_OFTEN: Final = 2  # times that a measurement is left out, after which it is not taken back
+_RAYS_NO_CHANCE: Final = 2  # gross errors that are no coincidence: one in ten thousand rays is one by chance
+_TIMES_LEFT_OUT: Final = 2  # times that a measurement is left out, after which it is not taken back
 _RIVAL_P: Final = 1e-3  # a suspect that is not that unlikely beside another one has a rival in it
 
 
@@ -98,7 +98,7 @@ def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
         leave = adjusted.used & (excess > 1) & (excess >= around[:, None, None])
         left += leave
         kept = adjusted.used & ~leave
-        used = kept | (seen & ~adjusted.used & (excess < 1) & (left < _OFTEN))
+        used = kept | (seen & ~adjusted.used & (excess < 1) & (left < _TIMES_LEFT_OUT))
         lone = (used.sum(axis=1, keepdims=True) == 1) & ((seen & ~used).sum(axis=1, keepdims=True) >= 2)
         doubtful |= lone
         used &= ~doubtful
@@ -128,7 +128,7 @@ def deserted(times: Floats, seen: Flags, used: Flags) -> Flags:
     near = (np.abs(times[:, None] - times) <= _RUN_S).astype(float)
     gone = np.tensordot(near, (seen & ~used).astype(float), 1)
     left = np.tensordot(near, used.astype(float), 1)
-    return np.asarray(used & (gone >= _SEVERAL) & (gone > left))
+    return np.asarray(used & (gone >= _RAYS_NO_CHANCE) & (gone > left))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

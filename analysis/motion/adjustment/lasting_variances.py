@@ -9,7 +9,7 @@ from scipy.linalg import solve_triangular
 from rig.arrays import Floats
 
 _PSEUDO: Final = 1.0  # observations that variances count as before a jump tells them
-_STEPS, _SETTLED = 12, 0.02  # of the iteration of variances, and the relative change that ends it
+_STEPS_MOST, _SETTLED = 12, 0.02  # of the iteration of variances, and the relative change that ends it
 _RANK: Final = 1e-9  # of the greatest eigenvalue
 
 
@@ -63,7 +63,7 @@ def variances_of(residuals: Residuals, alike: list[Floats], start: Floats) -> Fl
     pooled, independent = start, 1.0
     variances = np.tile(start, (len(alike), 1, 1))
     for alone in (False, True):
-        for _ in range(_STEPS):
+        for _ in range(_STEPS_MOST):
             before = variances
             square, redundancy, independent = squares(residuals, alike, variances, independent)
             if alone:

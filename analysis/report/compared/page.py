@@ -23,7 +23,7 @@ from rig.clocks import NS_PER_S
 #: So many charts of what differs are shown at once; the others are unfolded.
 _SHOWN: Final = 2
 #: As much is said to be more than 99 %.
-_NEARLY: Final = 0.995
+_NEARLY_ALL: Final = 0.995
 _COMMON: Final = {Common.CALIBRATION: "calibration", Common.SURVEY: "survey", Common.NOTHING: "nothing"}
 _NAMES: Final[dict[Language, str]] = {"en": "English", "nb": "Norsk"}
 
@@ -180,7 +180,7 @@ def _number(number: str) -> str:
 
 def _power_row(name: str, power: Power) -> list[str]:
     _, _, unit, decimals = WORDS[name]
-    percent = said("nearly") if power.probability >= _NEARLY else f"{100 * power.probability:.0f} %"
+    percent = said("nearly") if power.probability >= _NEARLY_ALL else f"{100 * power.probability:.0f} %"
     found = figure(f"{power.change_80:.{decimals + 1}f}")
     return [
         _named(name),

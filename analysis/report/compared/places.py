@@ -24,7 +24,7 @@ from rig.arrays import Floats
 PLACES_M: Final = (0, 5, 10, 15, 20)
 #: Of the pictures, px; the drawings have half of it in page units.
 _WIDTH, _HEIGHT = 240, 180
-_MARGIN: Final = 1.3  # around the largest jumper: helmet and hands reach beyond the points
+_MARGIN_FACTOR: Final = 1.3  # around the largest jumper: helmet and hands reach beyond the points
 _LEAST_PX: Final = 48.0
 _QUALITY: Final = 65
 _SPAN_M: Final = 3.8  # that a drawing shows from left to right
@@ -192,7 +192,7 @@ def _cut(jump: int, place: int, pulse: int, camera: str, image: ImageMeasurement
     low, high = found.min(axis=0), found.max(axis=0)
     across, down = high - low
     middle = (low + high) / 2
-    extent = max(across, down * _WIDTH / _HEIGHT) * _MARGIN
+    extent = max(across, down * _WIDTH / _HEIGHT) * _MARGIN_FACTOR
     return _Cut(jump, place, pulse, camera, (float(middle[0]), float(middle[1])), max(float(extent), _LEAST_PX))
 
 

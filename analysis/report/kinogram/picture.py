@@ -19,7 +19,7 @@ _ACROSS: Final = 2 * WIDTH + 3 * _GAP
 _HEAD, _FIGURE, _FOOT = 116, 164, 62
 _QUALITY: Final = 88
 _WIDEST_METRE: Final = 220  # px; a longer one leaves no room for the words beside it
-_SURE, _BOLD = 450, 750  # weights of letters
+_REGULAR, _BOLD = 450, 750  # weights of letters
 _GROUND: Final[Colour] = (238, 242, 247)
 _CARD: Final[Colour] = (255, 255, 255)
 _INK: Final[Colour] = (16, 26, 38)
@@ -69,12 +69,12 @@ class _Sheet:
         """A filled rectangle."""
         self.pixels[at[1] : at[1] + size[1], at[0] : at[0] + size[0]] = colour
 
-    def width(self, text: str, size: int, weight: int = _SURE) -> int:
+    def width(self, text: str, size: int, weight: int = _REGULAR) -> int:
         """Of a line of words, px."""
         return int(cv2.getTextSize((0, 0), text, (0, 0), self._font, size, weight)[2])
 
     def write(
-        self, text: str, at: tuple[int, int], size: int, weight: int = _SURE, *, colour: Colour = _INK, most: int
+        self, text: str, at: tuple[int, int], size: int, weight: int = _REGULAR, *, colour: Colour = _INK, most: int
     ) -> int:
         """A line of words, smaller where it would be wider than `most`; returns where it ends."""
         while size > 8 and self.width(text, size, weight) > most:
@@ -179,7 +179,7 @@ def _figure(sheet: _Sheet, kinogram: Kinogram, name: str, at: tuple[int, int]) -
         sheet.write(said.english, (left + 14, y + 123), 21, 650, colour=ink, most=wide - 28)
         sheet.write(said.norwegian, (left + 14, y + 146), 18, colour=ink, most=wide - 28)
     for line, down, size, weight in zip(
-        words.number_words(name, quantity), (92, 132), (34, 25), (_BOLD, _SURE), strict=False
+        words.number_words(name, quantity), (92, 132), (34, 25), (_BOLD, _REGULAR), strict=False
     ):
         beside = wide if down > 92 else 0
         sheet.write(line, (x + 18, y + down), size, weight, most=WIDTH - 46 - beside)

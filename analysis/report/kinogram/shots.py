@@ -21,7 +21,7 @@ from rig.arrays import Floats
 PLACES_M: Final = (0.0, 5.0, 10.0, 15.0, 20.0)
 #: Size of a picture, px.
 WIDTH, HEIGHT = 516, 387
-_MARGIN: Final = 1.2  # around the largest of the five: helmet and hands reach beyond the marked points
+_MARGIN_FACTOR: Final = 1.2  # around the largest of the five: helmet and hands reach beyond the marked points
 _BESIDE: Final = 24  # grey value beside an image
 _DARK, _LIT = 0.15, 0.3  # of white: pictures with a darker middle grey are brightened, to this one
 _STRONGEST: Final = 0.4  # power of a curve: a stronger one would show little but noise
@@ -202,7 +202,7 @@ def _px_per_m(camera: PlacedCamera, xyz: Floats) -> float:
 def _width_m(views: Sequence[_View]) -> float:
     """So wide are all pictures at the jumper that the largest has room."""
     spans = [np.ptp(view.overlay.places(), axis=0) / view.scale for view in views]
-    return max((max(across, down * WIDTH / HEIGHT) for across, down in spans), default=1.0) * _MARGIN
+    return max((max(across, down * WIDTH / HEIGHT) for across, down in spans), default=1.0) * _MARGIN_FACTOR
 
 
 def _shot(place: float, moment: Moment | None, view: _View | None, width_m: float) -> Shot:

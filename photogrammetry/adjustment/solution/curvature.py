@@ -28,10 +28,10 @@ _STRAIGHT: Final = 0.1
 #: The ends of the true interval may lie this part of the sigmas' interval elsewhere; sigmas are not known better.
 _SKEW: Final = 0.25
 _EXACT: Final = 1e-3  # least ratio of sigma0: the residuals of error-free simulated data are rounding
-_STEPS: Final = 3  # of the iteration with a parameter held: from so near a start the square sum is right to 1 %
+_HELD_STEPS: Final = 3  # of the iteration with a parameter held: from so near a start the square sum is right to 1 %
 _SEARCHED: Final = 4  # steps to an end of the interval
 _FARTHER: Final = 3.0  # times as far in one step, at most
-_CLOSE: Final = 0.02  # part of REACH: nearer to an end is not looked for
+_END_SHARE: Final = 0.02  # part of REACH: nearer to an end is not looked for
 _TINY: Final = 1e-9
 _LOWER: Final = 1e-6  # part of the square sum by which another minimum must be lower: less is the end of an iteration
 
@@ -180,7 +180,7 @@ class _Profile:
                 break
             rise = float(np.sqrt(max(self._rise(found), 0.0)))
             self.met[sign] = found
-            if abs(rise - REACH) <= _CLOSE * REACH:
+            if abs(rise - REACH) <= _END_SHARE * REACH:
                 break
             farther = reach * float(np.clip(REACH / max(rise, _TINY), 1.0 / _FARTHER, _FARTHER))
             reach, near = farther, self._at(sign * (farther - reach), found)
@@ -206,7 +206,7 @@ class _Profile:
         """Everything else adjusted, the parameter as in `start`; None where there is no optimum."""
         if np.any(start.interior[:, 0] <= 0.0):
             return None
-        return _nearly(self._held, start, self._a.free.defect, _STEPS)
+        return _nearly(self._held, start, self._a.free.defect, _HELD_STEPS)
 
     def _rise(self, state: State) -> float:
         a = self._a

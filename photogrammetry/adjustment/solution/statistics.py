@@ -19,7 +19,7 @@ NON_CENTRALITY = 4.13
 #: Redundant observations that the a-priori variance is worth: sigmas are misjudged by a factor of two at times.
 A_PRIORI = 4
 #: With so few redundant observations chance makes the estimated sigma0 so small that five sigmas are none.
-_FEW = 30
+_FEW_REDUNDANT = 30
 #: Probability of a sigma0 so small that chance does not explain it: beyond five sigmas, on one side.
 _NO_CHANCE = 2.9e-7
 
@@ -87,7 +87,7 @@ def posterior_scale(square_sum: float, redundancy: int) -> float:
     """
     if redundancy <= 0:
         return 1.0
-    small = square_sum < redundancy <= _FEW
+    small = square_sum < redundancy <= _FEW_REDUNDANT
     if small and special.chdtr(redundancy, square_sum) > _NO_CHANCE:
         return float(np.sqrt((square_sum + A_PRIORI) / (redundancy + A_PRIORI)))
     return float(np.sqrt(square_sum / redundancy))

@@ -23,13 +23,13 @@ from rig.arrays import Floats
 from rig.errors import BadInputError
 
 _GRID: Final = 25  # places along each side of the picture at which models are compared
-_STEPS: Final = 10  # Gauss-Newton; the model is nearly linear
+_DISTORTION_STEPS: Final = 10  # Gauss-Newton; the model is nearly linear
 _EXACT_PX: Final = 1e-6
 _MOST_PX: Final = 1.0  # a lens that differs by more is another one
 _ANGLES: Final = np.radians(np.linspace(0.0, 89.5, 4000))  # off the axis, at which a lens is sampled
 _SLOPE: Final = 1e-6  # step of a numerical derivative, relative
 _NEWTON: Final = 8  # steps from a sampled lens, which is right to a thousandth, to the last digit
-_NEAR: Final = 1e-9  # of a direction, relative to 1: much less than a pixel
+_SAME_DIRECTION: Final = 1e-9  # of a direction, relative to 1: much less than a pixel
 _FAR_OFF: Final = 0.25  # of the picture's width or height: no camera's principal point is so far from the middle
 _NOT_MIDDLE: Final = 0.05  # of the diagonal: what tells a turned picture from a principal point that is a little off
 _OBLONG: Final = 1.25  # fx / fy of pixels that are no square
@@ -198,7 +198,7 @@ def _over_the_picture(pinhole: Pinhole) -> tuple[Floats, float]:
     for _ in range(_NEWTON):
         xy = xy - _newton_step(pinhole, xy, wanted)
     off = np.linalg.norm(pinhole.distorted(xy) - wanted, axis=1)
-    shows = (off < _NEAR * (1.0 + far)) & (np.linalg.norm(xy, axis=1) <= r[count - 1])
+    shows = (off < _SAME_DIRECTION * (1.0 + far)) & (np.linalg.norm(xy, axis=1) <= r[count - 1])
     return xy[shows], float(shows.mean())
 
 
@@ -221,7 +221,7 @@ def _fitted(start: Floats, xy: Floats, target: Floats) -> Floats:
     """The interior orientation that is nearest to the target (n, 2) over the picture, by Gauss-Newton."""
     interior = start.copy()
     points = np.column_stack((xy * (1.0, -1.0), np.full(len(xy), -1.0)))
-    for _ in range(_STEPS):
+    for _ in range(_DISTORTION_STEPS):
         lines = linearise(_lens(interior[None]), np.eye(3)[None], np.zeros((1, 3)), points, target)
         slopes = np.asarray(lines.by_interior, dtype=float).reshape(-1, len(INTERIOR))
         size = np.linalg.norm(slopes, axis=0)

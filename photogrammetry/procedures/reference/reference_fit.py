@@ -21,7 +21,7 @@ from photogrammetry.procedures.reference.reference_estimate import (
 from rig.arrays import Floats, Integers
 from rig.errors import BadInputError
 
-_FEWEST: Final = 3  # points of a similarity transformation
+_POINTS_LEAST: Final = 3  # points of a similarity transformation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,7 @@ def fit_reference(
     Raises:
         BadInputError: fewer than three points, all on a line, or numbers beyond all bounds.
     """
-    if len(points) < _FEWEST:
+    if len(points) < _POINTS_LEAST:
         raise BadInputError(f"{len(points)} reference points that two images show: give at least three")
     try:
         with np.errstate(all="ignore"):
@@ -76,7 +76,7 @@ def _fitted(points: Sequence[ReferencePoint], covariance: Floats, family_risk: f
         if suspect is None:
             break
         remaining = [i for i in used if i != suspect.index]
-        enough = len(used) > _FEWEST and len(removed) <= len(points) // 3
+        enough = len(used) > _POINTS_LEAST and len(removed) <= len(points) // 3
         if not (suspect.certain and enough and _spans(points, remaining)):
             unsure.append(suspect)
             break

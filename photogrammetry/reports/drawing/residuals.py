@@ -21,7 +21,7 @@ _IMAGES = 24  # with more of them only the means are drawn
 _VECTOR = 17.0  # page units of a typical vector, at most
 _LONGEST = 60.0  # page units of the longest vector, at most
 _CELLS = 12  # along the longer side of the image
-_LEAST = 3  # residuals in a cell, for a mean
+_RESIDUALS_LEAST = 3  # residuals in a cell, for a mean
 
 
 def residual_drawings(a: Adjustment) -> tuple[Drawing, ...]:
@@ -172,7 +172,7 @@ def patterns_of_cameras(a: Adjustment) -> list[Drawing]:
     return drawings
 
 
-def cell_means(places: Floats, vectors: Floats, least: int = _LEAST) -> tuple[Floats, Floats]:
+def cell_means(places: Floats, vectors: Floats, least: int = _RESIDUALS_LEAST) -> tuple[Floats, Floats]:
     """Means of places and vectors (n, 2) in the cells of a square grid that hold `least` of them: both (cells, 2)."""
     low = places.min(axis=0)
     side = float(np.ptp(places, axis=0).max()) / _CELLS or 1.0

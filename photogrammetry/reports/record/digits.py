@@ -4,7 +4,7 @@ import math
 
 _SHORTEST = 1e-6  # smaller sigmas would need too many zeros: powers of ten instead
 _CONSTANT = 10  # significant digits of a value without a sigma
-_MOST = 15  # digits of a double
+_DIGITS_MOST = 15  # digits of a double
 
 
 def decimals(sigma: float) -> int:
@@ -20,7 +20,7 @@ def with_sigma(value: float, sigma: float) -> tuple[str, str]:
         places = decimals(sigma)
         return f"{value:.{places}f}", f"{sigma:.{places}f}"
     largest = math.floor(math.log10(abs(value))) if value else math.floor(math.log10(sigma))
-    digits = min(_MOST, max(0, largest - math.floor(math.log10(sigma)) + 1))
+    digits = min(_DIGITS_MOST, max(0, largest - math.floor(math.log10(sigma)) + 1))
     return f"{value:.{digits}e}", f"{sigma:.1e}"
 
 

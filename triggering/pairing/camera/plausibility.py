@@ -21,11 +21,11 @@ from triggering.timeline.pulse_train import PulseTrain
 #: A camera's first frames are accepted: the rig warms up, and no rhythm is known by which they could be judged.
 _FIRST: Final = 16
 #: Frames in a row that end a doubt, and that end the wait where nothing contradicts them.
-_SEVERAL: Final = 8
+_FRAMES_TO_END_DOUBT: Final = 8
 #: So many frames of a group are enough to judge it by.
-_MOST: Final = 32
+_FRAMES_JUDGED: Final = 32
 #: So many frames beside the rhythm that go on in it are accepted, if no other camera has a frame near.
-_FEW: Final = 3
+_FRAMES_OFF_RHYTHM: Final = 3
 #: A camera goes on in its rhythm within so many frames after a rejected one, or is doubted: one odd time is no slip.
 _SINGLE: Final = 4
 
@@ -126,11 +126,11 @@ class Plausibility:
         goes_on = last is not None and self._follows(last, first)
         if goes_on and self.doubted <= _SINGLE and self._arrivals.is_usual(first.latency_ns):
             return Verdict.ACCEPTED
-        group = list(islice(self._group(waiting, gaps=not goes_on), _MOST))
+        group = list(islice(self._group(waiting, gaps=not goes_on), _FRAMES_JUDGED))
         arrivals = self._arrivals.test([frame.latency_ns for frame in group])
         if arrivals.contradicts:
             return Verdict.REJECTED
-        closed = len(group) < min(len(waiting), _MOST)
+        closed = len(group) < min(len(waiting), _FRAMES_JUDGED)
         evidence = _Evidence(last, waiting, group, arrivals, others, read, closed, final)
         if self.doubted:
             return self._judge_in_doubt(evidence)
@@ -138,7 +138,7 @@ class Plausibility:
 
     def _judge_in_doubt(self, evidence: _Evidence) -> Verdict:
         """Judge a frame of a doubted camera: several in a row have to agree in everything."""
-        several = len(evidence.group) >= _SEVERAL
+        several = len(evidence.group) >= _FRAMES_TO_END_DOUBT
         sound = several and evidence.read and self._is_sound(evidence)
         if sound and all(evidence.others.coincide(frame.time) is not False for frame in evidence.group):
             return Verdict.ACCEPTED
@@ -169,7 +169,7 @@ class Plausibility:
 
     def _judge_out_of_turn(self, evidence: _Evidence) -> Verdict:
         """Judge a frame that does not go on in number and time: of a pulse after missed ones, or beside the rhythm."""
-        arrivals, several = evidence.arrivals, len(evidence.group) >= _SEVERAL
+        arrivals, several = evidence.arrivals, len(evidence.group) >= _FRAMES_TO_END_DOUBT
         # Frames behind it that came as usual confirm the rhythm, but not that the first one belongs to it.
         if arrivals.confirms and self._is_first_sound(evidence):
             enough = True
@@ -200,8 +200,8 @@ class Plausibility:
             return Verdict.ACCEPTED
         if near is None and all(evidence.others.coincide(frame.time) is not False for frame in evidence.group):
             # Alone, with those behind it: there is no frame beside which it could be set wrongly.
-            return Verdict.ACCEPTED if evidence.final or len(evidence.group) >= _FEW else Verdict.WAITS
-        return Verdict.WAITS if len(waiting) < _FEW else Verdict.REJECTED
+            return Verdict.ACCEPTED if evidence.final or len(evidence.group) >= _FRAMES_OFF_RHYTHM else Verdict.WAITS
+        return Verdict.WAITS if len(waiting) < _FRAMES_OFF_RHYTHM else Verdict.REJECTED
 
     def _has_room(self, evidence: _Evidence) -> bool:
         """Whether there were as many pulses since the last accepted frame as the camera took frames."""

@@ -16,8 +16,8 @@ from rig.clocks import HostNs
 #: Questions that are kept; at ten per second those of the last ten seconds, over which no crystal wanders.
 _KEPT: Final = 100
 #: The line goes through the shortest round trips: this share of them, and at least so many.
-_BEST: Final = 0.25
-_LEAST: Final = 8
+_BEST_SHARE: Final = 0.25
+_READINGS_LEAST: Final = 8
 #: Largest error of the box's clock: the ceramic resonator of an Arduino keeps 0.5 %.
 _CRYSTAL: Final = 0.005
 #: So many counts in a row that contradict the line show that the box's count or its clock was set.
@@ -107,7 +107,7 @@ class BoxClock:
             return False
         self.contradicted = 0
         self._readings.append(reading)
-        if len(self._readings) >= _LEAST:
+        if len(self._readings) >= _READINGS_LEAST:
             self.line = self._fit()
         return True
 
@@ -128,7 +128,7 @@ class BoxClock:
     def _fit(self) -> ClockLine:
         """Least squares, weighted by the round trips."""
         best = sorted(self._readings, key=lambda reading: reading.half_ns)
-        best = best[: max(_LEAST, round(_BEST * len(best)))]
+        best = best[: max(_READINGS_LEAST, round(_BEST_SHARE * len(best)))]
         half = np.array([reading.half_ns for reading in best])
         phase = np.array([reading.phase for reading in best])
         first = best[0].middle

@@ -35,7 +35,7 @@ _UNANSWERED: Final = 10
 _AGAIN_S: Final = 2.0
 #: A burst whose counts are not answered is ended so long after its time.
 _ANSWERS_S: Final = 1.0
-_HALF: Final = 0.5
+_HALF_PERIOD: Final = 0.5
 #: A rate that differs by more than this share from the wanted one is told as a warning.
 _OFF: Final = 1e-3
 
@@ -167,7 +167,7 @@ class TrainKeeper:
             if (read := box.read()) is None:
                 continue
             reading, _ = read
-            left_s = (pulses + _HALF - reading.phase) * self._rate.period_ns / NS_PER_S
+            left_s = (pulses + _HALF_PERIOD - reading.phase) * self._rate.period_ns / NS_PER_S
             left_s -= (host_now() - reading.middle) / NS_PER_S
             if left_s <= _EVERY_S:
                 self._wait(max(0.0, left_s))

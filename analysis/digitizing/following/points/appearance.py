@@ -24,7 +24,7 @@ from analysis.scene.static_image import GreyImage
 from rig.arrays import Floats
 
 CORRELATED: Final = 0.8  #: correlation of a match, at least
-_STEPS, _ENOUGH = 15, 1e-2  # iterations; px
+_STEPS_MOST, _SETTLED_PX = 15, 1e-2  # iterations; px
 _LARGEST_STEP = 1.0  # px
 _FARTHEST = 3.0  # px that a match may lie from its start: farther away is another start
 _AFFINE_SPREAD = 0.04  # of A from one match to the next
@@ -35,7 +35,7 @@ _BLOCK = 3  # px; residuals farther apart are independent
 _APART = 2.0  # px between two peaks of the correlation
 _RIVAL = 0.25  # of the correlation, by which a peak may be lower than the highest one: it is taken on whole pixels
 _UNKNOWNS = 8  # x, y, A, gain, offset
-_LEAST = 0.25  # of the weight of the template, that must agree
+_WEIGHT_AGREEING = 0.25  # of the weight of the template, that must agree
 _UNEXPLAINED = 1.5  # times the noise: larger residuals say that what surrounds the thing may move otherwise
 _CORE = 0.35  # of the half size of a template: the thing itself
 _DETERMINED_PX = 1.0  # sigma of a match of the core alone, at most
@@ -173,7 +173,7 @@ def _fitted(
     """
     prior = np.array((0, 0, *[_AFFINE_SPREAD**-2] * 4, _GAIN_SPREAD**-2, _OFFSET_SPREAD**-2))
     theta, spread = start, scale
-    for _ in range(_STEPS):
+    for _ in range(_STEPS_MOST):
         v, design, inside = _residuals(of, layers, theta)
         spread = max(scale, _MAD_TO_SIGMA * median(np.abs(v)))
         weight = weights * inside / (1 + (v / (_HALF_SIGMAS * spread)) ** 2)
@@ -182,13 +182,13 @@ def _fitted(
         step = np.linalg.solve(normal, weighted.T @ v + prior * (expected - theta))
         size = float(np.hypot(*step[:2]))
         theta = theta + step * min(1.0, _LARGEST_STEP / max(size, 1e-9))
-        if size < _ENOUGH:
+        if size < _SETTLED_PX:
             break
     if not np.isfinite(theta).all() or np.hypot(*(theta - start)[:2]) > _FARTHEST:
         return None
     v, design, inside = _residuals(of, layers, theta)
     weight = weights * inside / (1 + (v / (_HALF_SIGMAS * spread)) ** 2)
-    if weight.sum() < _LEAST * weights.sum():
+    if weight.sum() < _WEIGHT_AGREEING * weights.sum():
         return None
     weighted = design * weight[:, None] / spread**2
     inverse = np.asarray(np.linalg.inv(weighted.T @ design + np.diag(prior) + 1e-9 * np.eye(_UNKNOWNS)), float)

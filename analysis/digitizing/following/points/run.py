@@ -14,7 +14,7 @@ from rig.errors import BadInputError
 from rig.phrase import Phrase, phrase
 
 _GAP = 2  # pulses without any match that are bridged
-_ALONE = 4  # pulses in sequence in which one camera alone may show a thing that several cameras track
+_PULSES_ALONE = 4  # pulses in sequence in which one camera alone may show a thing that several cameras track
 _STRAINED_P = 0.05  # probability of those from which on places are taken back when they become too large
 _MEMORY = 8  # pulses back in which further marks tell of the motion
 
@@ -68,7 +68,7 @@ class Run:
             alone = alone + 1 if seen == 1 and len(self._views.names) > 1 else 0
             if not gap and velocity is None and self._views.dimensions == 3:
                 velocity = self._motion.velocity(belief)
-            if gap > _GAP or alone > _ALONE:
+            if gap > _GAP or alone > _PULSES_ALONE:
                 stopped = phrase("hand_at_pulse", "pulse {pulse}: {why}", pulse=pulse, why=reason)
                 break
         shown = [pulse for pulse in self._pulses if pulse in self._places]

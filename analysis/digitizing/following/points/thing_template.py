@@ -9,8 +9,8 @@ from analysis.scene.static_image import GreyImage
 from rig.arrays import Floats
 
 _FRONT = 4.0  # sigmas of the difference to the background: a pixel of something in front
-_SPREAD = 0.7  # of the half size: standard deviation of the weights around the thing
-_LEAST = 0.05  # weight below which a pixel is left out
+_WEIGHT_SPREAD = 0.7  # of the half size: standard deviation of the weights around the thing
+_WEIGHT_LEAST = 0.05  # weight below which a pixel is left out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,8 +73,8 @@ def template(picture: Picture, xy: Floats, half: int) -> Template:
         share, near = _share(grey - behind, picture.noise)
         weight = weight * near
     places = np.column_stack((x.ravel() - xy[0], y.ravel() - xy[1]))
-    weight *= np.exp(-(((x - xy[0]) ** 2 + (y - xy[1]) ** 2) / (2 * (_SPREAD * half) ** 2)))
-    chosen = weight.ravel() > _LEAST
+    weight *= np.exp(-(((x - xy[0]) ** 2 + (y - xy[1]) ** 2) / (2 * (_WEIGHT_SPREAD * half) ** 2)))
+    chosen = weight.ravel() > _WEIGHT_LEAST
     grey, behind, share, weight = (part.ravel()[chosen] for part in (grey, behind, share, weight))
     return Template(places[chosen], grey.astype(float), behind, share, weight, half, picture.noise)
 

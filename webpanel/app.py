@@ -23,7 +23,7 @@ from webpanel.problems import handle_errors
 from webpanel.routes.athletes import athletes_router
 from webpanel.routes.calibrating import calibrating_router
 from webpanel.routes.common import add_routers
-from webpanel.routes.contents import contents_router
+from webpanel.routes.contents import contents_router, notes_router, voice_notes_router
 from webpanel.routes.digitizing import digitizing_router
 from webpanel.routes.events import Changes, events_router
 from webpanel.routes.exports import exports_router
@@ -32,9 +32,9 @@ from webpanel.routes.links import links_router, visiting
 from webpanel.routes.login import login_router
 from webpanel.routes.measuring import measuring_router
 from webpanel.routes.observing import CountRequests, Metrics, observing_router
-from webpanel.routes.preview import cameras_router, preview_router
-from webpanel.routes.recordings import recordings_router, trash_router
-from webpanel.routes.rig import alarms_router, parts_router, rig_router
+from webpanel.routes.preview import cameras_router, close_up_router, preview_router
+from webpanel.routes.recordings import recording_router, recordings_router, trash_router
+from webpanel.routes.rig import alarms_router, parts_router, rehearsals_router, rig_router, trigger_router
 from webpanel.routes.start_list import start_list_router
 
 
@@ -73,19 +73,25 @@ def create_app(
     door = Door(access, warn, links, Sessions() if sessions is None else sessions)
     routers = (
         rig_router(service),
+        trigger_router(service),
+        rehearsals_router(service),
         parts_router(service),
         alarms_router(service),
+        recording_router(service),
         recordings_router(service, changes),
         start_list_router(service),
         trash_router(service, changes),
-        contents_router(service, changes),
+        contents_router(service),
+        notes_router(service, changes),
+        voice_notes_router(service, changes),
         files_router(service, streams.downloads),
         exports_router(service, streams.downloads),
         measuring_router(service, streams.downloads),
         athletes_router(service),
         digitizing_router(desks or Desks(_nothing_to_measure, lambda: None), streams.events),
         preview_router(service, streams),
-        cameras_router(service, streams),
+        cameras_router(service),
+        close_up_router(service, streams),
         calibrating_router(service),
         events_router(service, changes, streams.events),
         login_router(door, service.tell),

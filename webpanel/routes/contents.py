@@ -44,11 +44,10 @@ _PNG: Responses = {
 }
 
 
-def contents_router(service: RigService, changes: Changes) -> APIRouter:
+def contents_router(service: RigService) -> APIRouter:
     """The routes that read recordings."""
     router = strict_router("Recordings")
     readers = anyio.CapacityLimiter(_READERS)
-    thumbnails: dict[tuple[object, ...], bytes] = {}
 
     @router.get("/recordings/{recording_id}/pulses", responses=refusals(404))
     async def list_pulses(recording_id: RecordingId) -> Pulses:
@@ -93,26 +92,12 @@ def contents_router(service: RigService, changes: Changes) -> APIRouter:
         """The pulse at which to open a recording: the take-off if the jump was measured, otherwise where most moves."""
         return await run_sync(partial(service.moment, jump=jump, by_motion=by_motion), recording_id, limiter=readers)
 
-    @router.get("/recordings/{recording_id}/notes", responses=refusals(404))
-    def list_notes(recording_id: RecordingId) -> list[Note]:
-        """The notes at single pulses, in order."""
-        return service.notes(recording_id)
+    _add_thumbnails(router, service, readers)
+    return router
 
-    @router.put("/recordings/{recording_id}/notes/{pulse}", responses=CHANGING | refusals(404))
-    def set_note(recording_id: RecordingId, pulse: Pulse, note: NewNote) -> list[Note]:
-        """Note something at a pulse, in place of what was noted there; the log itself is not changed."""
-        notes = service.note(recording_id, pulse, note.text)
-        changes.recordings_changed()
-        return notes
 
-    @router.delete("/recordings/{recording_id}/notes/{pulse}", responses=CHANGING | refusals(404))
-    def remove_note(recording_id: RecordingId, pulse: Pulse) -> list[Note]:
-        """Remove the note of a pulse; if it has none, nothing changes."""
-        notes = service.note(recording_id, pulse, "")
-        changes.recordings_changed()
-        return notes
-
-    _add_voice_notes(router, service, changes)
+def _add_thumbnails(router: APIRouter, service: RigService, readers: anyio.CapacityLimiter) -> None:
+    thumbnails: dict[tuple[object, ...], bytes] = {}
 
     @router.get(
         "/recordings/{recording_id}/thumbnail.jpg",
@@ -132,10 +117,37 @@ def contents_router(service: RigService, changes: Changes) -> APIRouter:
                 del thumbnails[next(iter(thumbnails))]
         return Response(jpeg, media_type="image/jpeg", headers=_KEPT if final else None)
 
+
+def notes_router(service: RigService, changes: Changes) -> APIRouter:
+    """The routes of notes about single pulses, written."""
+    router = strict_router("Recordings")
+
+    @router.get("/recordings/{recording_id}/notes", responses=refusals(404))
+    def list_notes(recording_id: RecordingId) -> list[Note]:
+        """The notes at single pulses, in order."""
+        return service.notes(recording_id)
+
+    @router.put("/recordings/{recording_id}/notes/{pulse}", responses=CHANGING | refusals(404))
+    def set_note(recording_id: RecordingId, pulse: Pulse, note: NewNote) -> list[Note]:
+        """Note something at a pulse, in place of what was noted there; the log itself is not changed."""
+        notes = service.note(recording_id, pulse, note.text)
+        changes.recordings_changed()
+        return notes
+
+    @router.delete("/recordings/{recording_id}/notes/{pulse}", responses=CHANGING | refusals(404))
+    def remove_note(recording_id: RecordingId, pulse: Pulse) -> list[Note]:
+        """Remove the note of a pulse; if it has none, nothing changes."""
+        notes = service.note(recording_id, pulse, "")
+        changes.recordings_changed()
+        return notes
+
     return router
 
 
-def _add_voice_notes(router: APIRouter, service: RigService, changes: Changes) -> None:
+def voice_notes_router(service: RigService, changes: Changes) -> APIRouter:
+    """The routes of notes about single pulses, spoken."""
+    router = strict_router("Recordings")
+
     @router.get("/recordings/{recording_id}/voice-notes", responses=refusals(404))
     def list_voice_notes(recording_id: RecordingId) -> list[VoiceNote]:
         """The spoken notes, in the order in which they were spoken."""
@@ -178,6 +190,8 @@ def _add_voice_notes(router: APIRouter, service: RigService, changes: Changes) -
         notes = service.remove_voice_note(recording_id, number)
         changes.recordings_changed()
         return notes
+
+    return router
 
 
 def _jpeg(service: RigService, recording_id: str, pulse: int, camera: str | None, width: int | None) -> bytes:

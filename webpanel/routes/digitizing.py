@@ -118,6 +118,15 @@ def digitizing_router(desks: Desks, streams: Streams) -> APIRouter:
         """A camera's frame without loss."""
         return Response(desk.log.png(pulse, camera, difference=difference), media_type="image/png", headers=_KEPT)
 
+    _add_places(router, opened, base)
+    _add_sessions(router, opened, base + "/sessions/{operator}", streams)
+    _add_results(router, opened, base + "/sessions/{operator}")
+    return router
+
+
+def _add_places(router: APIRouter, opened: Callable[[str], Desk], base: str) -> None:
+    AtDesk = Annotated[Desk, Depends(opened)]  # noqa: N806 - a type
+
     @router.get(base + "/geometry", responses=refusals(404, 409))
     def get_geometry(
         desk: AtDesk, operator: OperatorName,
@@ -153,10 +162,6 @@ def digitizing_router(desks: Desks, streams: Streams) -> APIRouter:
     ) -> Repeatability:
         """How operators agree in what all of them measured: scatter of a click, bias of each, effect on angles."""
         return desk.repeatability(list(dict.fromkeys(name.strip() for name in operators.split(",") if name.strip())))
-
-    _add_sessions(router, opened, base + "/sessions/{operator}", streams)
-    _add_results(router, opened, base + "/sessions/{operator}")
-    return router
 
 
 def _add_sessions(router: APIRouter, opened: Callable[[str], Desk], base: str, streams: Streams) -> None:

@@ -181,32 +181,9 @@ def preview_router(service: RigService, streams: OpenStreams) -> APIRouter:
     return router
 
 
-def cameras_router(service: RigService, streams: OpenStreams) -> APIRouter:
-    """The routes of single cameras."""
+def cameras_router(service: RigService) -> APIRouter:
+    """The routes of the settings of single cameras."""
     router = strict_router("Watching")
-    at_once = anyio.CapacityLimiter(_SETTING_UP)
-
-    def wait_for_aids(camera: str, after: int) -> CameraAids | None:
-        return service.camera_aids(camera, RigPulse(after), _WAIT_S)
-
-    def wait_for_picture(camera: str, after: int, peaking: bool) -> tuple[CloseUp, bytes] | None:
-        found = service.close_up(camera, RigPulse(after), _WAIT_S, peaking=peaking)
-        return None if found is None else (found, to_jpeg(_painted(found)))
-
-    @router.get(
-        "/cameras/{camera}/aids",
-        response_model=CameraAids,
-        dependencies=[Depends(streams.pictures.place)],
-        responses=_NOTHING_NEW | refusals(404, 503),
-    )
-    async def get_camera_aids(camera: _Camera, after: _After = -1) -> CameraAids | Response:
-        """How sharp and how well exposed the newest frame of a camera is, for turning its lens.
-
-        Waits up to a second for another pulse than `after`; 204 if none has come. Made of what the preview shows: of
-        pixels of 10 and 12 bits the highest eight.
-        """
-        found = await run_sync(wait_for_aids, camera, after, limiter=at_once)
-        return Response(status_code=HTTPStatus.NO_CONTENT) if found is None else found
 
     @router.get("/cameras/{camera}/balls", responses=refusals(404))
     def get_camera_balls(camera: _Camera) -> CameraBalls:
@@ -235,6 +212,36 @@ def cameras_router(service: RigService, streams: OpenStreams) -> APIRouter:
         was changed. `save` writes it into the rig file too; else it holds until the service ends.
         """
         return service.change_light(camera, change)
+
+    return router
+
+
+def close_up_router(service: RigService, streams: OpenStreams) -> APIRouter:
+    """The routes that show single cameras."""
+    router = strict_router("Watching")
+    at_once = anyio.CapacityLimiter(_SETTING_UP)
+
+    def wait_for_aids(camera: str, after: int) -> CameraAids | None:
+        return service.camera_aids(camera, RigPulse(after), _WAIT_S)
+
+    def wait_for_picture(camera: str, after: int, peaking: bool) -> tuple[CloseUp, bytes] | None:
+        found = service.close_up(camera, RigPulse(after), _WAIT_S, peaking=peaking)
+        return None if found is None else (found, to_jpeg(_painted(found)))
+
+    @router.get(
+        "/cameras/{camera}/aids",
+        response_model=CameraAids,
+        dependencies=[Depends(streams.pictures.place)],
+        responses=_NOTHING_NEW | refusals(404, 503),
+    )
+    async def get_camera_aids(camera: _Camera, after: _After = -1) -> CameraAids | Response:
+        """How sharp and how well exposed the newest frame of a camera is, for turning its lens.
+
+        Waits up to a second for another pulse than `after`; 204 if none has come. Made of what the preview shows: of
+        pixels of 10 and 12 bits the highest eight.
+        """
+        found = await run_sync(wait_for_aids, camera, after, limiter=at_once)
+        return Response(status_code=HTTPStatus.NO_CONTENT) if found is None else found
 
     @router.get(
         "/cameras/{camera}/picture.jpg",

@@ -79,8 +79,8 @@ def _query(
     )  # fmt: skip
 
 
-def recordings_router(service: RigService, changes: Changes) -> APIRouter:
-    """The routes that start, list and change recordings."""
+def recording_router(service: RigService) -> APIRouter:
+    """The routes that begin and end recordings."""
     router = strict_router("Recordings")
 
     @router.post("/recordings", status_code=HTTPStatus.CREATED, responses=CHANGING | {201: _LOCATED})
@@ -118,6 +118,13 @@ def recordings_router(service: RigService, changes: Changes) -> APIRouter:
         A page sends `seen`, so that a second tap on its button does not end a recording that has only just begun.
         """
         return service.stop_recording(recording_id, order or StopOrder())
+
+    return router
+
+
+def recordings_router(service: RigService, changes: Changes) -> APIRouter:
+    """The routes that list and change recordings."""
+    router = strict_router("Recordings")
 
     @router.get("/recordings", response_model=list[Recording], responses=_LISTED)
     def list_recordings(request: Request, query: Annotated[RecordingQuery, Depends(_query)]) -> Response:

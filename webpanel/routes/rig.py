@@ -43,6 +43,23 @@ def rig_router(service: RigService) -> APIRouter:
         """Begin to disconnect the cameras. Not while recording. While idle it changes nothing."""
         return service.disarm()
 
+    @router.get("/rig")
+    def get_rig() -> RigView:
+        """The rig file in use."""
+        return service.rig()
+
+    @router.get("/doctor", responses=refusals(503))
+    async def examine() -> DoctorReport:
+        """Check everything that a recording depends on, and say what to do; takes some seconds."""
+        return await run_sync(service.doctor, limiter=one_at_a_time)
+
+    return router
+
+
+def trigger_router(service: RigService) -> APIRouter:
+    """The routes about the pulses."""
+    router = strict_router("Rig")
+
     @router.get("/trigger")
     def get_trigger() -> TriggerView:
         """Who makes the pulses, at what rate, and what of that can be changed here."""
@@ -72,15 +89,12 @@ def rig_router(service: RigService) -> APIRouter:
         """
         return service.burst(order or BurstOrder())
 
-    @router.get("/rig")
-    def get_rig() -> RigView:
-        """The rig file in use."""
-        return service.rig()
+    return router
 
-    @router.get("/doctor", responses=refusals(503))
-    async def examine() -> DoctorReport:
-        """Check everything that a recording depends on, and say what to do; takes some seconds."""
-        return await run_sync(service.doctor, limiter=one_at_a_time)
+
+def rehearsals_router(service: RigService) -> APIRouter:
+    """The routes about rehearsals."""
+    router = strict_router("Rig")
 
     @router.get("/rehearsal")
     def get_rehearsal() -> Rehearsals:

@@ -19,7 +19,7 @@ class CommandTimes:
 
     Args:
         exposure_ns: exposure time.
-        longest_ns: a command that was longer on its way, or whose answer was, has no time that can be used.
+        longest_ns: a command that was longer on its way, or whose answer was, has no usable time.
     """
 
     def __init__(self, exposure_ns: int, longest_ns: int) -> None:

@@ -1,6 +1,6 @@
-"""Errors that a person can act on, as a tree that is split by what the caller does next.
+"""Errors that a person can act on, as a tree split by what the caller does next.
 
-Every message is one line that names what is wrong and ends in what to do about it. The command line prints the message
+Every message is one line that names the fault and ends in what to do about it. The command line prints the message
 without a traceback and exits with `exit_code`. Errors that the panel shows are raised with a `Phrase` instead of a
 text, so that it can translate them.
 """

@@ -72,7 +72,7 @@ _COMMANDS: Final = {
 
 #: Options that were renamed; scripts may still use their former names, which no help shows.
 _FORMER_NAMES: Final = {"--output": "--out", "--marks": "--out"}
-#: Open files that are asked for, and the fewest that will do, beside those that are open already.
+#: Open files that are asked for, and the fewest that will do, beside those open already.
 _FILES: Final = 4096
 _LEAST_FILES: Final = 48
 #: The base of errors in the use of options and arguments, which Typer does not name.

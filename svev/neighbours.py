@@ -1,4 +1,4 @@
-"""Finds services (`svev serve`) that run on this computer, to say who has what a command needs."""
+"""Finds services (`svev serve`) on this computer, to say which one has what a command needs."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress

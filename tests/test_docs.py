@@ -47,6 +47,8 @@ SOURCES = [
     )
     for path in (ROOT / room).rglob("*.py")
 ]
+#: Where sentences of docstrings are not counted yet.
+UNTIDY = ("analysis/candidates", "analysis/identification", "analysis/ski_bars", "season")
 DECISIONS = sorted((ROOT / "docs" / "decisions").glob("0*.md"))
 FENCE = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
 RUN = re.compile(
@@ -169,21 +171,36 @@ def test_the_index_of_messages_has_every_heading() -> None:
     assert shown() == index(), "run: python -m tests.support.message_index"
 
 
+def _overloaded(text: str) -> list[str]:
+    """The sentences of a text that have three relative pronouns: a noun says it in fewer words."""
+    text = re.sub(r"`[^`]*`|\]\([^)]*\)", "", text)
+    paragraphs = re.split(r"\n\s*\n|\n\s*(?:-|\d+\.|\w+:) ", text)
+    sentences = [each for paragraph in paragraphs for each in re.split(r"[.:;!?]\s", paragraph)]
+    pronoun = re.compile(r"\b(?:which|that|what|who|whose|whom)\b")
+    return [" ".join(each.split()) for each in sentences if len(pronoun.findall(each)) > 2]
+
+
 def test_no_sentence_must_be_read_twice() -> None:
-    """None has three relative pronouns: a noun says it in fewer words."""
     found = []
     for page in PAGES:
         if page.parent == ROOT:
             continue
         text = re.sub(r"```.*?```|^(?:\||#|<!--|- \[`).*?$", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
-        text = re.sub(r"`[^`]*`|\]\([^)]*\)", "", text)
-        paragraphs = re.split(r"\n\s*\n|\n\s*(?:-|\d+\.) ", text)
-        sentences = [each for paragraph in paragraphs for each in re.split(r"[.:;!?]\s", paragraph)]
-        found += [
-            f"{_name(page)}: {' '.join(each.split())}"
-            for each in sentences
-            if len(re.findall(r"\b(?:which|that|what|who|whose|whom)\b", each)) > 2
-        ]
+        found += [f"{_name(page)}: {each}" for each in _overloaded(text)]
+    assert not found, "\n".join(found)
+
+
+def test_no_docstring_or_comment_must_be_read_twice() -> None:
+    found = []
+    for path in SOURCES:
+        if any(path.is_relative_to(ROOT / place) for place in UNTIDY):
+            continue
+        source = path.read_text()
+        nodes = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+        texts = [ast.get_docstring(each) or "" for each in ast.walk(ast.parse(source)) if isinstance(each, nodes)]
+        comments = re.findall(r"((?:^[ \t]*#.*\n)+)", source, re.MULTILINE)
+        texts += [re.sub(r"^[ \t]*#:?", "", each, flags=re.MULTILINE) for each in comments]
+        found += [f"{_name(path)}: {each}" for text in texts for each in _overloaded(text)]
     assert not found, "\n".join(found)
 
 

@@ -1,8 +1,8 @@
 """Aligns jumps at the take-off.
 
 The take-off is when O passes the edge. Each jump's own motion tells that time to some milliseconds only, but the edge
-is at the same place for all jumps of a hill, and O passes any place at a time that is known to a fraction of that. So
-the places at which the jumps' take-offs lie are averaged, and every jump is aligned with that place. Then what is
+is at the same place for all jumps of a hill, and the time at which O passes any place is known to a fraction of these.
+So the places at which the jumps' take-offs lie are averaged, and every jump is aligned with that place. Then what is
 uncertain in the edge shifts all jumps alike. Where the places contradict each other (another hill, another frame of the
 survey), each jump keeps its own take-off.
 """

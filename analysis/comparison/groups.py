@@ -5,7 +5,7 @@ are judged by how jumps scatter about the mean of their own group, errors of mea
 distribution (further groups of the athlete tell of that scatter, too); errors of calibration and take-off that all
 jumps of a group have in common come on top. The greatest of all differences is judged as in
 `analysis.comparison.difference`, as that of as many independent differences: their number is that of two measurements
-of one jump, which scatter more freely over time than jumps do, so that chance is rather given too much than too little.
+of one jump, which scatter more freely over time than jumps do: chance is rather given too much than too little.
 """
 
 from collections import Counter

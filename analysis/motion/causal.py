@@ -219,7 +219,7 @@ class CausalFilter:
         self._beliefs = _Beliefs(*(np.stack(part) for part in zip(*bounded, strict=True)))
 
     def _bounded(self, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-        """Mean and covariance of a model in which the skis do what skis do, where it was less certain than that.
+        """Mean and covariance of a model with the skis bounded to how skis move, wherever it was less certain.
 
         A pseudo-observation of zero brings the variance v of such a part of the state down to its limit l: its own
         variance is r = v l / (v - l), so that 1 / v + 1 / r = 1 / l.

@@ -32,7 +32,7 @@ def fates_of(
         raw: its raw states.
         conditions: of points and skis in the adjustment of each pulse; one that is in order and has no raw state is
             not given, as its name is uncertain.
-        motion: the model over time: what it left out, and places that say what is in sight.
+        motion: the model over time: its left-out measurements, and places that say what is in sight.
         system: the oriented cameras.
     """
     left_out = {(test.pulse, test.camera, test.what) for test in motion.removed}

@@ -1,4 +1,4 @@
-"""Writes the files of a result anew that say whose jump it is, when that was corrected; nothing is measured again."""
+"""Writes the files of a result anew that name the jumper, when his name was corrected; nothing is measured again."""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -147,11 +147,10 @@ def _noted(pulses: Sequence[PulseState], scale: Mapping[str, float]) -> Iterator
 def figures(pulses: Sequence[PulseState]) -> dict[str, Any]:
     """The figures of some pulses, ready for JSON.
 
-    `points` counts pulses in which all points were measured, `points_controlled` those in which three cameras or more
-    saw each of them, `skis` those in which both skis were measured, `solved` those in which all of it was;
-    `controlled` those of the last in which each was seen by three cameras or more.
-    `median_sigma_m` is that of the coordinates of all smoothed points (raw ones where there are none), `coarse` the
-    number of pulses in which one is larger than 0.02 m.
+    `points` counts pulses with all points measured, `points_controlled` those with each of them seen by three cameras
+    or more, `skis` those with both skis measured, `solved` those with all of it; `controlled` those of the last with
+    each seen by three cameras or more. `median_sigma_m` is that of the coordinates of all smoothed points (raw ones
+    where there are none), `coarse` the number of pulses in which one is larger than 0.02 m.
     """
     states: list[JumperState | SmoothedState] = [pulse.smoothed or pulse.raw for pulse in pulses]
     sigmas = [

@@ -35,7 +35,7 @@ class Scalable(Objects, Protocol):
 def scaled_to_fit(
     objects: _Scalable, calibration: Floats, readings: Sequence[_Scalable] = ()
 ) -> tuple[_Scalable, Adjusted, float]:
-    """Objects with sigmas with which most of them agree, and by what factor those that came with them were too small.
+    """Objects with sigmas that most of them agree with, and the factor by which the given sigmas were too small.
 
     The median of the tests decides, so that single mistakes do not count. Sigmas that are not significantly too small
     stay, and so do those that would exceed one pixel.

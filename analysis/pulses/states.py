@@ -1,8 +1,8 @@
 """The state of the jumper in each pulse from its points and skis: angles, height, speed, each with everything in sigma.
 
 All that a pulse gives is put into one vector: P1 to P4 and the unit directions of right and left ski, 18 numbers. Its
-covariance is that of the image measurement, in which points and skis are independent, and that of the calibration,
-which they share. Every quantity takes its sigma from there, by its derivatives.
+covariance is that of the image measurement, where points and skis are independent, and of the calibration, which they
+share. Every quantity takes its sigma from there, by its derivatives.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Which files of a result say whose jump it is, and what they are written from when that was corrected."""
+"""Which files of a result name the jumper, and from what they are written when his name was corrected."""
 
 from typing import Final
 

@@ -134,7 +134,7 @@ def _fitted(discs: _Discs) -> list[Disc | None]:
 
 
 def _judged(discs: _Discs, start: Floats, moved: Floats) -> list[Disc | None]:
-    """Those that explain what differs from the ground and lie near their start, from which they moved by (m,) px."""
+    """Those that explain the difference from the ground and lie near their start; they moved by (m,) px."""
     last = _equations(discs, start)
     v, weight, radius = last.v, last.weight, np.exp(discs.size)
     used = weight > 0

@@ -1,7 +1,7 @@
 """The pose of one image from points whose coordinates are uncertain too: least squares with the whole covariance.
 
-The covariance of an image point is that of its measurement plus that of the object point, projected (paper, D3b, with
-the object points eliminated), plus what the model leaves out.
+The covariance of an image point is that of its measurement, plus the object point's, projected (paper, D3b, with the
+object points eliminated), plus what the model leaves out.
 """
 
 from collections.abc import Sequence

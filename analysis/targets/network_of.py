@@ -30,8 +30,8 @@ from rig.errors import BadInputError
 
 #: Unknowns of each camera. None is left out for being insignificant: the others would make up for it.
 ESTIMATE = ("c", "x0", "y0", "a1", "a2", "b1", "b2")
-#: What is known of any lens beforehand: sigmas of weighted observations, in terms of the picture's width w. They
-#: keep pictures that say too little solvable, so that the verdict can tell what is missing; others they do not touch.
+#: What is known of any lens beforehand: sigmas of weighted observations, in terms of the picture's width w. They keep
+#: pictures with too little content solvable, so that the verdict can tell what is missing; others they do not touch.
 _C, _PRINCIPAL, _RADIAL, _DECENTRING = 0.5, 0.05, 0.1, 0.005  # c: of itself; x0, y0: of w; shifts at w / 2: of w / 2
 #: Corners that a picture needs to be worth its six unknowns.
 FEWEST_CORNERS = 8

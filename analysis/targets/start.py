@@ -137,7 +137,7 @@ def _plane_pose(plane: _Plane, matrix: Floats) -> tuple[Floats, Floats] | None:
     poses = [_pose(*each) for each in zip(rotations, shifts, strict=True)] if found else []
     if not poses or poses[0][0][:, 2] @ poses[0][1] < 0.0:
         return poses[0] if poses else None
-    # a plane that is seen straight from its front has no perspective, which that method needs
+    # a plane seen straight from its front has no perspective, which that method needs
     found, rotation, shift = cv2.solvePnP(plane.flat, plane.seen[:, None], matrix, None, flags=cv2.SOLVEPNP_ITERATIVE)
     return _pose(rotation, shift) if found else None
 

@@ -12,8 +12,8 @@ from rig.action import ActionKeys
 from rig.clocks import NS_PER_S
 from rig.errors import CameraError
 
-#: Features that switch PTP on, and those that say what has become of it: of the convention, Basler and FLIR before it,
-#: Allied Vision, Teledyne Dalsa.
+#: Features that switch PTP on, and those of its state: of the convention, Basler and FLIR before it, Allied Vision,
+#: Teledyne Dalsa.
 _PTP: Final = (
     ("PtpEnable", ("PtpStatus",)), ("GevIEEE1588", ("GevIEEE1588StatusLatched", "GevIEEE1588Status")),
     ("PtpMode", ("PtpStatus",)), ("ptpMode", ("ptpStatus",)),

@@ -39,7 +39,7 @@ class Features:
             self._before.append((name, value))
 
     def set_back(self) -> None:
-        """Write what was there before, the latest first, so that selectors select what they did then."""
+        """Write the values from before, the latest first, so that selectors select the same as then."""
         while self._before:
             name, value = self._before.pop()
             with suppress(GLib.Error):  # it was not to be written now, or it is no longer there

@@ -16,7 +16,7 @@ from rig.settings.camera import CameraSettings
 
 #: The command to expose.
 SOFTWARE_TRIGGER: Final = "TriggerSoftware"
-#: Triggers that take one frame per pulse, the best first, and the feature that has to be 1 for that.
+#: Triggers that take one frame per pulse, the best first, and the feature to be set to 1 for it.
 _ONE_FRAME: Final = {"FrameStart": "", "FrameBurstStart": "AcquisitionBurstFrameCount", "ExposureStart": "",
                      "AcquisitionStart": "AcquisitionFrameCount"}  # fmt: skip
 #: How long an input waits for a steady level, by the names of Hikrobot, Basler, Teledyne Dalsa, FLIR and Allied Vision.

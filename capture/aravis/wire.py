@@ -96,7 +96,7 @@ class Pace:
     Attributes:
         frame_ns: time from the first to the last packet of a frame, at least.
         by: the feature that makes it so; empty: the port.
-        notices: what could not be set and what that costs, a sentence each.
+        notices: settings that the camera refuses and what each costs, a sentence each.
     """
 
     frame_ns: float

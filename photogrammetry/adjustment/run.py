@@ -27,7 +27,7 @@ class Outcome:
         blunders: suspected gross errors, the largest test value first.
         components: variance components; None where they do not settle.
         removed: the observations that snooping took out, in that order.
-        aside: groups of which one is wrong, nobody knows which, and that the adjustment does without.
+        aside: groups left out by the adjustment: one observation of each is wrong, and nobody knows which.
         intervals: of camera parameters whose sigma is beyond its linearisation (`settled`).
     """
 

@@ -53,7 +53,7 @@ def orient(
         alternative: 1: static tie points alone; 2: moving ones too.
         moving: pattern of the moving points' names (`*` and `?`); None: `H*`, if there are such ones.
         uncertain_interior: interior parameters that a camera estimates and whose given value has a sigma are weighted
-            observations, so that their uncertainty is in that of the poses. All others are held in any case.
+            observations: their uncertainty is part of the poses'. All others are held in any case.
 
     Raises:
         BadInputError: the network has no images, a constant pose, or no point of the moving ones that are named.

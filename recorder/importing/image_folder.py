@@ -30,8 +30,8 @@ _DIGITS: Final = re.compile(r"(\d+)")
 class ImageFolder:
     """The images of a folder, in the order of the numbers in their names; those in folders inside it do not count.
 
-    Where one number of the names counts, it is that of the frame, and a number that is left out is a frame that was
-    lost. Otherwise frames count from 1.
+    Where one number of the names counts, it is that of the frame, and a number left out is a lost frame. Otherwise
+    frames count from 1.
 
     Args:
         path: the folder.

@@ -138,8 +138,8 @@ class Assembler:
     def _settle(self, now: HostNs) -> None:
         """Find up to which time every pulse has been returned.
 
-        While frames waited for buffers the rings may have overflowed. The ids of the frames that come after that tell
-        which pulses were lost, so those are waited for.
+        While frames waited for buffers the rings may have overflowed. The ids of the next frames tell which pulses were
+        lost, so those frames are waited for.
         """
         if self.backlog or self._decided:
             self._keeping_up_since = None

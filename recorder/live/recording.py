@@ -127,7 +127,7 @@ class Recording:
 
     Attributes:
         span: which pulses belong to the recording.
-        account: of which of them the log tells, and what became of those that are in the file.
+        account: from when until when the log tells of every pulse, and what became of those in the file.
         ending: how the log ends.
         opening: the log, on its way to being open.
         continues: id of the recording that this one continues, empty if none.

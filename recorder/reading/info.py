@@ -58,7 +58,7 @@ class LogInfo:
         rig: fields of the last rig record.
         known_lost: runs of pulses without a tag of which the log itself says that they were lost (`svev recover`).
         merged: of a log that was made of two: fields that say which, and how their clocks differed; empty otherwise.
-        imported: of a log that was made of films: fields that say which, and that no trigger stands behind them; empty
+        imported: of a log that was made of films: fields that name it, and say that no trigger made its pulses; empty
             otherwise.
         compacted: of a log whose images are coded: fields that say of which log, and how; empty otherwise.
         disk: what went wrong with the disk while the log was written; empty text if nothing.

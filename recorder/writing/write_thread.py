@@ -1,6 +1,6 @@
 """Writes chunks to the disk in a thread of its own, in order, makes them durable twice a second, and closes the file.
 
-All calls that may wait for the disk are made here, so that nobody else ever waits for a disk that hangs.
+All calls that may wait for the disk are made here, so nobody else ever waits for a hanging disk.
 """
 
 import mmap

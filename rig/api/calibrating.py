@@ -61,7 +61,7 @@ class CalibratedLens(Model):
 
 
 class Calibrating(Model):
-    """The helper: what it sees, what was kept, what came of it."""
+    """The helper: what it sees, the kept pictures, the result."""
 
     state: CalibratingState
     still: bool = Field(False, description="whether the target is still")

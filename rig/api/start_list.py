@@ -110,7 +110,7 @@ class UndoOrder(Model):
 
 
 class StartList(Model):
-    """Who jumps in which order, who is next, and what happens from one jumper to the next."""
+    """The order of the jumpers, the next one, and what happens from one jumper to the next."""
 
     version: int = Field(0, description="counts up with every change")
     round: int = Field(1, description="counts up when everybody has jumped or was skipped")

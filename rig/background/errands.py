@@ -40,8 +40,8 @@ class Errands(Generic[State]):
         nothing: state of those who have asked for nothing.
         busy: whether programs have to stand still at present; None: there is nothing better to do on this computer.
         heard: gives the state from the one before and how far the program is, or whether it stands still.
-        done: gives the state from who asked, what the program has come to, and the folder of its files, which is
-            removed afterwards. It may take long, and raise OSError or SvevError.
+        done: gives the state from who asked, the program's result, and the folder of its files, which is removed
+            afterwards. It may take long, and raise OSError or SvevError.
         failed: gives the state from the one before the errand and the reason.
         folder: in which programs get a folder for their files; made if it is missing. None: that of the system.
         yielding: whether programs take only the processor time that nobody else wants, also where nothing is recorded.
@@ -180,7 +180,7 @@ def run_errand(work: Callable[[Any, Path, Teller], object]) -> None:
     """Do one errand; the whole of such a program.
 
     Args:
-        work: takes what was ordered, a folder for files, and whom to tell, and gives what it has come to.
+        work: takes the order, a folder for files, and whom to tell, and gives its result.
     """
 
     def do(what: ErrandOrder, tell: Teller) -> ErrandDone:

@@ -13,7 +13,7 @@ NAME_MAX: Final = 255
 #: What no id holds: control characters, soft hyphens, marks without width or that turn the direction, no-characters.
 _UNSEEN: Final = r"\u00ad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff0-\uffff"
 #: What the id of a recording looks like, for Python, Rust and JavaScript: it begins with a letter or digit, and holds
-#: nothing that ends a part of an address, that Windows forbids in names, or that nobody sees.
+#: no character that ends a part of an address, is forbidden by Windows, or is invisible.
 ID_PATTERN: Final = (
     rf"[^\u0000-/:-@\[-`{{-\u00a0{_UNSEEN}]" rf'[^\u0000-\u001f"*/:<>?\\|\u007f-\u00a0{_UNSEEN}]{{0,99}}'
 )

@@ -1,8 +1,7 @@
 """Starts child processes, speaks to them, ends them: single ones, or a table of them that are restarted by name.
 
-A child is a plain program, started by the launcher. It inherits exactly the descriptors that its row names, and a
-control channel whose end tells it that the parent is gone. Nothing is named in the file system, so nothing is left
-behind.
+A child is a plain program, started by the launcher. It inherits exactly the descriptors of its row, and a control
+channel whose end tells it that the parent is gone. Nothing is named in the file system, so nothing is left behind.
 """
 
 import select

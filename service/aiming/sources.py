@@ -1,8 +1,8 @@
 """Chooses what the places of the balls in a camera's picture follow from: poses, the last orientation, survey or plan.
 
-Given poses come first: with them in the rig file a camera is to stand where they say, and a picture that shows the
-balls elsewhere is that of a camera that has moved. A survey says roughly at most where cameras stand, so with it the
-last orientation counts. The plan is for the first day.
+Given poses come first: with them in the rig file a camera is to stand where they say, and a picture with the balls
+elsewhere is of a camera that has moved. A survey says roughly at most where cameras stand, so with it the last
+orientation counts. The plan is for the first day.
 """
 
 from collections.abc import Sequence

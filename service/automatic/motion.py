@@ -20,7 +20,7 @@ _LEAST_GREY: Final = 6.0
 #: Noise of a cell's mean at least, grey values.
 _LEAST_SIGMA: Final = 0.5
 _SIGMA_OF_MEAN_DEVIATION: Final = 1.25
-#: How fast the usual image follows, s: cells that agree, and cells that deviate (something new that stays).
+#: How fast the usual image follows, s: cells that agree, and cells that deviate (a new thing, left there).
 _FOLLOW_S: Final = 3.0
 _FOLLOW_NEW_S: Final = 20.0
 #: Nothing is found before the usual image is known for so long, s.

@@ -1,4 +1,4 @@
-"""From one start list to the next: who follows whom, what is taken over. Pure functions of immutable lists."""
+"""From one start list to the next: order of jumpers, fields taken over. Pure functions of immutable lists."""
 
 from collections.abc import Iterable
 
@@ -106,8 +106,8 @@ def skipped(start_list: StartList) -> StartList:
 def edited(start_list: StartList, changes: dict[str, str]) -> StartList:
     """The list with other session fields of the next jumper.
 
-    A bib of the list makes the jumper of that line the next one. Any other bib makes it somebody who stands in no
-    line, whose name is not that of the line; the line keeps waiting. Other fields are corrections for this jump.
+    A bib of the list makes the jumper of that line the next one. Any other bib makes it somebody outside the list,
+    whose name is not the line's; the line keeps waiting. Other fields are corrections for this jump.
     """
     bib, present = changes.get("bib"), start_list.next
     if bib is not None and bib != present.session.bib:

@@ -172,7 +172,7 @@ def _rows(sheet: Any) -> list[Row]:
 
 
 def _fill_merged(rows: list[Row], part: bytes) -> None:
-    """Give each row what stands in a cell that it shares with the rows above, of which Excel keeps the first alone."""
+    """Give each row the content of a cell shared with the rows above: Excel keeps that of the first row alone."""
     by_number = dict(rows)
     left = _MERGED_ROWS_MAX
     for column, first, last in _MERGED.findall(part):

@@ -1,4 +1,4 @@
-"""The log that is at work: what is done with it, how far that is, and the figures that are known of it already."""
+"""The log that is at work: what is done with it, how far it is, and its figures as far as known."""
 
 import threading
 from collections.abc import Callable, Iterator, Sequence

@@ -132,7 +132,7 @@ def note_source(log: Path, source: str) -> None:
 
 
 def keep_step(log: Path, step: AfterStep, problem: Statement | None) -> None:
-    """Note that a log was measured, and what came of a step after that.
+    """Note that a log was measured, and the result of a step afterwards.
 
     Raises:
         OSError: the disk refuses.

@@ -30,7 +30,7 @@ class Outcome(Model):
         source: by which content of survey or poses the last attempt failed, as `service.measuring.retries` marks it;
             None if it failed for another reason, or did not.
         further: what was tried with the log afterwards, and why it failed.
-        names: the corrections of the session that stand in those files of the result that say whose jump it is.
+        names: the corrections of the session that stand in the result's files.
     """
 
     measured: datetime

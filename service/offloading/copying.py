@@ -1,4 +1,4 @@
-"""The program that copies a log and all that belongs to it elsewhere, and that reads both once more later.
+"""The program that copies a log with all its files elsewhere, and reads both once more later.
 
 A log counts as copied when it was read back from the other disk and its checksum stands beside it, in the form that
 `sha256sum --check` reads.

@@ -1,4 +1,4 @@
-"""Copies a file so that a copy that broke off is gone on with, and none counts that was not read back from its disk."""
+"""Copies a file so that an interrupted copy is continued, and only a copy that was read back from its disk counts."""
 
 import hashlib
 import os

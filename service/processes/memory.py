@@ -58,7 +58,7 @@ def check_memory(rig: RigSettings, preroll_s: float) -> None:
 
 
 def available_bytes(root: Path = Path("/")) -> int:
-    """Memory that programs can still get: what the machine has, what our cgroups allow, what ulimit -v allows.
+    """Memory that programs can still get: the machine's, the limit of our cgroups, what ulimit -v allows.
 
     Args:
         root: where `proc` and `sys` are.

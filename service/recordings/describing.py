@@ -1,4 +1,4 @@
-"""Recordings as the panel shows them: fields and counts, which goes on with which, what became of each pulse."""
+"""Recordings as the panel shows them: fields, counts and continuations, and what became of each pulse."""
 
 from collections.abc import Sequence
 from typing import Any

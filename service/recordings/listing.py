@@ -35,5 +35,5 @@ def more_of(session: Mapping[str, str]) -> dict[str, str]:
 
 
 def utc(time: UtcNs) -> datetime:
-    """A time as the API gives it: to the microsecond before it, so that who asks for what came since then finds it."""
+    """A time as the API gives it: to the microsecond before it, so that a query for recordings since then finds it."""
     return _EPOCH + timedelta(microseconds=time // 1000)

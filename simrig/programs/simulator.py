@@ -17,7 +17,7 @@ from simrig.programs.messages import Answer, Done, Refused
 
 Config = TypeVar("Config")
 
-#: Short, so that a thread that has to be in time waits only briefly for the thread that renders.
+#: Short, so that a thread with a deadline waits only briefly for the rendering thread.
 _SWITCH_INTERVAL_S: Final = 0.0005
 _IDLE_S: Final = 60.0
 

@@ -1,8 +1,8 @@
 """Central projection of object points into a camera's image: Eq. (A1) of the paper.
 
 Conventions are those of the network file: the columns of R are r1, r2, r3; pixel frame x right, y down, (0, 0) = centre
-of the top-left pixel; distortion acts on the projected side. The simulated world has its own projection and
-shares no code with `photogrammetry`, so that it can judge what that computes.
+of the top-left pixel; distortion acts on the projected side. The simulated world has its own projection and no code in
+common with `photogrammetry`, so that it can judge its results.
 """
 
 import math

@@ -16,9 +16,9 @@ point and a direction (tail to tip) of each ski line, and its parameters by Eq. 
 Of a pulse: `time_s` is the scene time at which it fires; `state_s` is the middle of the exposure that it starts (of
 several exposure times the mean), at which points, skis, angles, height, speed, landmarks and centre of mass are true.
 `images` are true at the middle of each camera's own exposure, `middle_s`, with its distortion and in its pose of that
-moment, which `poses` gives for cameras that move. `visible` says which share of each marker's disc is in sight,
-`in_sight` whether that is half of it or more; `light` is the share of the full light. `takeoff_s` is the scene time at
-which O passes the edge, `takeoff_pulse` the same in pulses.
+moment, for moving cameras one of `poses`. `visible` says which share of each marker's disc is in sight, `in_sight`
+whether that is half of it or more; `light` is the share of the full light. `takeoff_s` is the scene time at which O
+passes the edge, `takeoff_pulse` the same in pulses.
 """
 
 import math

@@ -1,1 +1,1 @@
-"""GigE Vision cameras outside of a recording: who is there, which features they have, which addresses they get."""
+"""GigE Vision cameras outside of a recording: the present ones, their features, their addresses."""

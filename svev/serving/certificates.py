@@ -66,8 +66,8 @@ class CertificateFiles:
 def make_certificate(names: Sequence[str], folder: Path) -> CertificateFiles:
     """Make a server's certificate, and before it the CA if the folder has none.
 
-    The CA is good for the names that it was made for and for no others, so that a phone that trusts it trusts nothing
-    else. A certificate that is there is replaced once the new one is whole.
+    The CA is good for the names that it was made for and for no others, so a phone that trusts it trusts nothing else.
+    A certificate that is there is replaced once the new one is whole.
 
     Args:
         names: names and IP addresses by which the server is called; those of loopback are added.

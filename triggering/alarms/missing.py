@@ -1,10 +1,10 @@
 """Finds the cameras that begin to miss pulses, and the likely cause.
 
 Page's test (Biometrika 41, 1954): every frame that came or failed adds the logarithm of how much likelier it is in a
-camera that fails than in one that does not, and the sum never falls below zero. If it exceeds `ln T`, the camera fails;
-a good camera exceeds it once in `T` pulses at most (Lorden, Ann. Math. Stat. 42, 1971). The alarm ends by the same test
-the other way round. So a camera that loses every second frame causes an alarm after 16 pulses, one that loses 2 %
-after some hundred, and no number of clean pulses does.
+failing camera than in a sound one, and the sum never falls below zero. If it exceeds `ln T`, the camera fails; a good
+camera exceeds it once in `T` pulses at most (Lorden, Ann. Math. Stat. 42, 1971). The alarm ends by the same test the
+other way round. So a camera that loses every second frame causes an alarm after 16 pulses, one that loses 2 % after
+some hundred, and no number of clean pulses does.
 """
 
 from collections import deque

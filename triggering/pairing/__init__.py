@@ -1,1 +1,1 @@
-"""Pairing: which frame belongs to which pulse, and what became of every pulse in every camera."""
+"""Pairing: the pulse of each frame, and what became of every pulse in every camera."""

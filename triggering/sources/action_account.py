@@ -1,4 +1,4 @@
-"""The account of action commands: what each camera has answered, and what of that people should know.
+"""The account of action commands: the cameras' answers, and the news in them for people.
 
 The class is pure: what was sent, what came and the time go in, counts and words come out.
 """

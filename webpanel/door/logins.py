@@ -164,7 +164,7 @@ class Door:
         raise _unauthorized("wrong_token", "the token is wrong: take the one that the service was started with")
 
     def admit(self, request: HTTPConnection) -> Caller:
-        """Check that a request carries a token, the cookie of an open session, or that of a link to what it asks for.
+        """Check that a request carries a token, the cookie of an open session, or a link's cookie for this address.
 
         Raises:
             ProblemError: 401 it carries none, a wrong token, or a link that has ended; 429 too many tokens were wrong.

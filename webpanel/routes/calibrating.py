@@ -16,7 +16,7 @@ def calibrating_router(service: RigService) -> APIRouter:
 
     @router.get("/calibration")
     def get_calibration() -> Calibrating:
-        """What the helper sees, what is missing, which pictures it has kept, and what came of them.
+        """What the helper sees, the pictures that are missing, the kept ones, and their result.
 
         Whoever asks keeps it going: after a minute in which nobody does, it looks at pictures no more.
         """

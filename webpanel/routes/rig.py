@@ -62,7 +62,7 @@ def trigger_router(service: RigService) -> APIRouter:
 
     @router.get("/trigger")
     def get_trigger() -> TriggerView:
-        """Who makes the pulses, at what rate, and what of that can be changed here."""
+        """Who makes the pulses, their rate, and what of it can be changed here."""
         return service.trigger()
 
     @router.patch("/trigger", responses=CHANGING)

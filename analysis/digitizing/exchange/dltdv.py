@@ -10,8 +10,8 @@ DLTdv8 counts pixels from 1, from the top left corner, y down: its `movieDataSto
 column of the image (https://github.com/tlhedrick/dltdv, DLTdv8a_internal). DLTdv versions 3 to 7 turn the image over
 and count y from the bottom.
 
-DLTdv knows neither states nor names of points in these files. A table `names.csv`, which is ours, says which point and
-camera is what, the pulse of the first frame, and whether the lens' distortion was removed. Coefficients are exact only
+DLTdv knows neither states nor names of points in these files. Our own table `names.csv` gives the names of points and
+cameras, the pulse of the first frame, and says whether the lens' distortion was removed. Coefficients are exact only
 without it: of lenses that distort, points are written without distortion, and put back when they are read.
 """
 

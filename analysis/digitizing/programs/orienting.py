@@ -36,7 +36,7 @@ _EVERYBODY: Final = ""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OrientingOrder:
-    """What to orient: the cameras of which log, by which survey or poses, and by which clicked balls.
+    """What to orient: the cameras of a log, by a survey or poses, and by clicked balls.
 
     No clicked balls (None): by those that the images show.
     """

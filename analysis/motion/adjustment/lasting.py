@@ -3,10 +3,10 @@
 What puts the axis of a ski off in an image, the other ski, a leg or a boot beside it, an edge in the light, a width
 that is not quite known, puts it off alike in the next images of that camera; likewise what is beside a marker. More
 pulses do not average such errors away. The weights of the adjustment stay as they are, so the motion does not change;
-its covariance, and that of how late the cameras are, gain what errors do to them that fade by exp(-t / T) or stay for
-the whole jump (consider parameters:
-Tapley, Schutz and Born 2004, chapter 6). With the normal equations N x = J' W l, an error e that the measurements of a
-short run of pulses share moves the unknowns by N^-1 J' W e; in so short a time it hardly changes.
+its covariance, and that of how late the cameras are, gain the effect of errors that fade by exp(-t / T) or stay for the
+whole jump (consider parameters: Tapley, Schutz and Born 2004, chapter 6). With the normal equations N x = J' W l, an
+error e that the measurements of a short run of pulses share moves the unknowns by N^-1 J' W e; in so short a time it
+hardly changes.
 
 How large they are, the residuals tell: where cameras contradict each other alike in neighbouring pulses, something
 lasts. So each camera has variances of its own for each thing, estimated together with what the images tell of

@@ -79,7 +79,7 @@ def write_kinograms(
 
 
 def _hill(log: Path) -> str:
-    """Name of the rig that recorded the log, which is that of the hill; empty if it has none."""
+    """Name of the rig that recorded the log, as a rule its hill's; empty if it has none."""
     with RecordingReader(log, skim=True) as reader:
         for _ in reader.items():
             if RIG_METADATA in reader.metadata:

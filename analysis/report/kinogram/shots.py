@@ -106,8 +106,8 @@ def moments_of(course: Course) -> list[Moment | None]:
 def shots_of(course: Course, measured: JumpMeasurements | None, system: CameraSystem, log: Path) -> list[Shot]:
     """The pictures of a jump, one for each of `PLACES_M`.
 
-    Of the cameras with a frame of that pulse in which the middle of the jumper lies, the best is: first one that has
-    him whole, then one in which most of his points and skis were measured, then the one that shows him largest.
+    Of the cameras with a frame of that pulse in which the middle of the jumper lies, the best is: first one with the
+        whole jumper, then one with most of his points and skis measured, then the one that shows him largest.
 
     Args:
         course: of the jump.

@@ -1,4 +1,4 @@
-"""The values that an adjustment may change, and which of them is which unknown (column of the observation equations).
+"""The values that an adjustment may change, and the unknown (column of the observation equations) of each.
 
 Order of the columns: camera parameters, poses, points. The points come last and in two parts: those that distances and
 differences tie together (`kept`), then those that are eliminated one by one (`eliminated`, Schur complement).

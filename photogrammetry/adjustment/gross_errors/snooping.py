@@ -56,8 +56,8 @@ def snoop(
         family_risk: probability that all tests together suspect anything in sound data.
 
     Returns:
-        The adjustment without gross errors, those suspected errors that cannot be located, and the observations that
-        were taken out, in that order.
+        The adjustment without gross errors, suspected errors that cannot be located, and the observations taken out, in
+        this order.
 
     Raises:
         NotSolvableError: a rank defect.

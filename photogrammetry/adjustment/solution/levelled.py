@@ -12,8 +12,8 @@ from photogrammetry.adjustment.solution.normals import build_normals
 def levelled(problem: Problem, state: State) -> Problem:
     """The problem with weights of one order of magnitude, for the analysis of its rank alone.
 
-    Every image point has the median sigma. A relation has the one that makes it weigh as much as the image points do on
-    that of its unknowns which it tells most of.
+    Every image point has the median sigma. A relation gets its sigma from the unknown that it determines best: it
+    weighs as much there as the image points do.
 
     Args:
         problem: the network made ready.

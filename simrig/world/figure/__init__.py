@@ -1,1 +1,1 @@
-"""The body of the simulated jumper: of what it is made, what hides what, where its mass is."""
+"""The body of the simulated jumper: its parts, the hiding of one by another, its mass."""

@@ -82,10 +82,10 @@ def verify_command(
     trigger counts, and names each missing frame whose tag says another cause. Where the log holds what the source of
     the pulses told (a trigger box, a line of the computer), that is compared as well.
 
-    Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a recorder that
-    was killed leaves a log that is not closed), still being written, or not the whole recording (it ended early, its
-    end is not known, or it goes on from a log that does not lie beside it); 7 sound, but contradicted, with --ledger
-    also where only a cause is. What can be read is printed in any case.
+    Exit codes: 0 clean or partial; 2 no such file, no log of svev, or truncated; 3 damaged otherwise (a killed recorder
+    leaves an unclosed log), still being written, or not the whole recording (it ended early, its end is not known, or
+    it goes on from a log that does not lie beside it); 7 sound, but contradicted, with --ledger also where only a cause
+    is. What can be read is printed in any case.
 
     Example: svev verify recordings/jump.mcap
     """

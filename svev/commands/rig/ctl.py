@@ -264,7 +264,7 @@ def skip(context: typer.Context, as_json: Json = False) -> None:
 
 @start_list_app.command("show", short_help="Show who has jumped, is next, and waits.")
 def show_start_list(context: typer.Context, as_json: Json = False) -> None:
-    """Show the start list: who has jumped, who is next, who waits.
+    """Show the start list: those who have jumped, the next one, those who wait.
 
     Example: svev ctl startlist show
     """

@@ -1,4 +1,4 @@
-"""Hears what a child process of the doctor finds, so that a camera or card that hangs does not hang the doctor."""
+"""Hears what a child process of the doctor finds, so that a hanging camera or card does not hang the doctor."""
 
 import tempfile
 import time

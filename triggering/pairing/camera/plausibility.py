@@ -1,9 +1,9 @@
 """Judges whether the trigger time of a frame is plausible: frame numbers, times and arrivals must agree.
 
-A camera's clock may be set at any time, by PTP that locks or by a restart that nobody reports, and the times of its
-frames may slip while the clock that can be read goes on. A time that is off by a whole period looks like a good time of
-another pulse. Three kinds of evidence tell: the frame number, which goes on by one for each frame that the camera took;
-the readings of the clock; and the arrival (`arrivals`). A frame is accepted at once if all of them agree. Any other
+A camera's clock may be set at any time, by PTP when it locks or by an unreported restart, and the times of its frames
+may slip while its clock goes on. A time that is off by a whole period looks like a good time of another pulse. Three
+kinds of evidence tell: the frame number, which goes on by one for each frame that the camera took; the readings of the
+clock; and the arrival (`arrivals`). A frame is accepted at once if all of them agree. Any other
 frame waits for more evidence: for its camera's next frames, the next reading of the clock, and the frames of the other
 cameras. A camera of which a frame was rejected is doubted: its frames are refused until several in a row agree in
 everything.

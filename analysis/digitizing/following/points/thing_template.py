@@ -80,7 +80,7 @@ def template(picture: Picture, xy: Floats, half: int) -> Template:
 
 
 def _share(difference: Floats, noise: float) -> tuple[Floats, Floats]:
-    """Share of each pixel that belongs to what is in front, and which pixels show it or its outline."""
+    """Share of each pixel that belongs to things in front, and the pixels that show these or their outline."""
     off = np.abs(difference).astype(np.float32)
     front = (off > _FRONT * noise).astype(np.uint8)
     front = np.asarray(cv2.morphologyEx(front, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.uint8)

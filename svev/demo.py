@@ -8,8 +8,7 @@ from typing import Any, Final, Literal
 
 from analysis.film.contact_sheet import write_contact_sheet
 from recorder.checking.verify import verify
-from recorder.log.survey_path import survey_path
-from recorder.log.truth_path import truth_path
+from recorder.log.beside import survey_path, truth_path
 from recorder.publishing.subscriber import free_address, subscriber
 from rig.errors import BadInputError
 from rig.host.endings import counted_endings

@@ -11,8 +11,7 @@ from analysis.procedure.analyze import analyze
 from analysis.procedure.result_folder import write_folder
 from analysis.report.figures import EARLY_S, plus_minus
 from analysis.result.model import Jump, PulseState, Quantity, SmoothedState
-from recorder.log.survey_path import survey_path
-from recorder.log.truth_path import truth_path
+from recorder.log.beside import survey_path, truth_path
 from rig.errors import NoJumpError
 from svev import console
 

@@ -14,7 +14,7 @@ from bench.service.catalogue import write_jump
 from bench.service.listing import some_jump
 from bench.service.serving import ServedRig, served_rig
 from recorder.catalogue.folder import Catalogue
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from recorder.log.session_changes import session_path
 from rig.api.recordings import RecordingQuery
 from rig.errors import BadInputError

@@ -16,7 +16,7 @@ from typing import Any, Final
 import msgspec
 from isal.isal_zlib import crc32
 
-from recorder.log.part_path import numbered
+from recorder.log.beside import numbered
 
 NAME: Final = ".svev-catalogue.db"
 #: The file, and what SQLite keeps beside it while it is open.

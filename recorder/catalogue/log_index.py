@@ -19,8 +19,7 @@ from recorder.catalogue.file_key import FileKey, file_key, key_of
 from recorder.catalogue.folder_watch import FolderWatch
 from recorder.catalogue.trash import trash_of
 from recorder.catalogue.whole_recordings import entries_of, int64, parts_with, put_recording
-from recorder.log.jumper_path import jumper_path
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import jumper_path, measured_path
 from recorder.log.session_changes import session_path
 from recorder.log.write_lock import is_being_written
 from recorder.reading.log_reader import LogReader

@@ -11,12 +11,8 @@ from typing import Final
 
 from recorder.catalogue.entry import SUFFIX
 from recorder.catalogue.voice_notes import voice_folder
-from recorder.log.digitized_path import digitized_path
-from recorder.log.jumper_path import jumper_path
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import digitized_path, jumper_path, measured_path, survey_path, truth_path
 from recorder.log.session_changes import session_path
-from recorder.log.survey_path import survey_path
-from recorder.log.truth_path import truth_path
 from rig.host.files import opened_folder
 
 _NAME: Final = ".trash"

@@ -1,4 +1,4 @@
-"""Grey values of pictures: colour becomes grey, fewer bits become more.
+"""Grey values of pictures, image files among them: colour becomes grey, fewer bits become more.
 
 Colour becomes luma by ITU-R BT.601, Y = 0.299 R + 0.587 G + 0.114 B, as OpenCV computes it. A video that holds luma and
 chroma has its grey values already: its luma is taken, whatever colours it was made of, and limited range (16 to 235 of
@@ -103,3 +103,19 @@ def _spread(bits: int) -> Stored:
     full = np.rint((np.arange(most + 1) - black) * (most / (white - black))).clip(0, most)
     spread: Stored = full.astype(np.uint8 if bits == 8 else np.dtype("<u2"))
     return spread
+
+
+def decoded(data: NDArray[np.uint8]) -> Stored | None:
+    """The grey values of an image file; None if it cannot be read.
+
+    Args:
+        data: the file, (bytes,).
+
+    Raises:
+        ValueError: its pixels are of a kind that logs do not hold; the text says which.
+    """
+    try:
+        picture: NDArray[Any] | None = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    except cv2.error:
+        return None
+    return None if picture is None else grey(picture)

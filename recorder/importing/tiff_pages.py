@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from recorder.importing.decoding import decoded
+from recorder.importing.grey import decoded
 from recorder.importing.picture_dates import PictureDates
 from recorder.importing.source import Taken, single_gaps
 from recorder.importing.tiff_damage import damage

@@ -7,7 +7,7 @@ from typing import Final
 
 from recorder.live.assembler import Assembler
 from recorder.live.recording import Recording
-from recorder.log.part_path import named, numbered
+from recorder.log.beside import named, numbered
 from rig.api.recordings import Counts
 from rig.clocks import HostNs, UtcNs, host_now
 from rig.errors import FileVanishedError, NameTakenError, StorageError, SvevError

@@ -8,8 +8,8 @@ from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
 
+from recorder.log.beside import named, numbered
 from recorder.log.extent import CONTINUES, part_after, part_before, part_number
-from recorder.log.part_path import named, numbered
 from recorder.reading.items import Chunk, Item
 from recorder.reading.log_reader import LogReader
 from rig.errors import BadInputError

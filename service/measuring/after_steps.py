@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from recorder.catalogue.trash import beside
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, MeasuringStep
 from rig.background.child import run_child

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep
 from rig.api.statement import Statement

@@ -7,7 +7,7 @@ from typing import Final
 
 from pydantic import Field, ValidationError
 
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from rig.api.fields import Model
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep

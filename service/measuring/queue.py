@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from analysis.result.naming import CAMERAS
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from recorder.reading.parts import parts_of
 from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringQueue

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Final
 
 from analysis.result.naming import bears_names
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from recorder.log.session_changes import session_changes
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, Measurement, MeasuringState, StepState

@@ -11,7 +11,7 @@ from pathlib import Path
 from analysis.result import file as result_file
 from analysis.result.model import Jump, MeasuredRecording
 from analysis.worker.findings import MeasuredJump
-from recorder.log.jumper_path import jumper_path
+from recorder.log.beside import jumper_path
 from rig.api.jump import LastJump
 from rig.errors import BadInputError, StorageError
 from service.recordings.live_results import summaries

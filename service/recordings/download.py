@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from recorder.log.digitized_path import digitized_path
+from recorder.log.beside import digitized_path
 from recorder.log.session_changes import session_changes
 from recorder.reading.corrected_log import corrected_log
 from rig.errors import BadInputError, StateForbidsError

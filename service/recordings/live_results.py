@@ -11,8 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from recorder.log.jumper_path import jumper_path
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import jumper_path, measured_path
 from rig.api.jump import LastJump
 from rig.host.files import TEXT_MAX, read_whole
 from service.measuring.results import jumps_of

@@ -8,7 +8,7 @@ from analysis.report.kinogram.earlier import NAME as KINOGRAM
 from recorder.catalogue.entry import SUFFIX, Entry
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.log_index import FoundJump
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from rig.api.athletes import Athlete, AthleteJump, JumpQuery, folded
 from rig.api.jump import LastJump
 from rig.api.statement import Level

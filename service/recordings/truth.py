@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from recorder.log.survey_path import survey_path
-from recorder.log.truth_path import truth_path
+from recorder.log.beside import survey_path, truth_path
 from recorder.reading.triplets import tags
 from rig.clocks import HostNs, UtcAnchor
 from rig.errors import ProcessDiedError, SvevError

@@ -14,8 +14,7 @@ from analysis.digitizing.desks import Desks
 from analysis.digitizing.files import DeskFiles
 from recorder.catalogue.entry import unlisted_logs
 from recorder.catalogue.folder import Catalogue
-from recorder.log.digitized_path import digitized_path
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import digitized_path, measured_path
 from recorder.log.write_lock import is_being_written
 from recorder.publishing.keys import check_publication
 from rig.api.jump import LastJump

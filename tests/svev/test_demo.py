@@ -10,7 +10,7 @@ import pytest
 
 from analysis.scene.survey import read_survey
 from bench.analysis.hill_logs import write_hill_log
-from recorder.log.truth_path import truth_path
+from recorder.log.beside import truth_path
 from rig.settings.file import CONFIG
 from simrig.world.scenario import load_scenario
 from svev.demo import _showing

@@ -11,8 +11,7 @@ import httpx
 from analysis.cameras.source import read_source
 from analysis.digitizing.desks import Desks
 from analysis.digitizing.files import DeskFiles
-from recorder.log.digitized_path import digitized_path
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import digitized_path, measured_path
 from tests.support.waiting import wait_until
 from tests.webpanel.memory_service import MemoryService
 from webpanel.app import create_app

@@ -11,8 +11,7 @@ import typer
 from analysis.cameras.source import Source, read_source
 from analysis.digitizing.desks import Desks
 from analysis.digitizing.files import DeskFiles
-from recorder.log.digitized_path import digitized_path
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import digitized_path, measured_path
 from recorder.reading.info import info
 from rig.errors import UnknownRecordingError
 from rig.host.endings import ENDINGS

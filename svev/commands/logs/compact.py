@@ -6,7 +6,7 @@ from typing import Annotated, Final
 import typer
 
 from recorder.compacting.compact import compact
-from recorder.log.part_path import named, numbered
+from recorder.log.beside import named, numbered
 from svev import console
 from svev.commands.logs.contents import AlsoJson, LogPath
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from recorder.log.jumper_path import jumper_path
+from recorder.log.beside import jumper_path
 from rig.api.jump import LastJump, MeasuredValue
 from rig.api.measuring import AfterStep, MeasuringQueue, MeasuringState, MeasuringStep
 from rig.api.recordings import RecordingOrder

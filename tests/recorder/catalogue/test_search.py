@@ -14,7 +14,7 @@ from recorder.catalogue.entry import Entry, LogState
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.log_index import FoundJump
 from recorder.catalogue.search_words import understood
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from recorder.log.session_changes import write_session_changes
 from rig.api.athletes import JumpQuery
 from rig.api.jump import LastJump, MeasuredValue

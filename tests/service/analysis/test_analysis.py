@@ -11,7 +11,7 @@ import pytest
 
 from analysis.result import file as result_file
 from recorder.checking.verify import verify
-from recorder.log.jumper_path import jumper_path
+from recorder.log.beside import jumper_path
 from recorder.reading.log_reader import LogReader
 from rig.jumper import JumperState
 from rig.topics import JUMPER, JUMPER_CAMERAS, JUMPER_SCENE

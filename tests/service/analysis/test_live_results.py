@@ -10,7 +10,7 @@ from analysis.result import file as result_file
 from analysis.result.model import MeasuredRecording
 from analysis.worker.findings import MeasuredJump
 from recorder.catalogue.folder import Catalogue
-from recorder.log.jumper_path import jumper_path
+from recorder.log.beside import jumper_path
 from rig.api.jump import LastJump
 from rig.errors import StorageError
 from rig.pulse import PulseNumber

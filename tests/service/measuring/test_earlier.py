@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from recorder.catalogue.folder import Catalogue
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from recorder.log.session_changes import write_session_changes
 from rig.api.jump import LastJump
 from service.measuring.keeping import keep_result

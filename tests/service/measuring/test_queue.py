@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from analysis.report.kinogram.earlier import read_earlier
 from bench.analysis.hill_logs import HillLog
 from recorder.catalogue.folder import Catalogue
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from recorder.log.session_changes import write_session_changes
 from rig.api.jump import LastJump
 from rig.api.measuring import Measurement, MeasuringState

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from service.measuring.waiting import NAME
 from simrig.world.survey import survey
 from tests.analysis.scene.hill import training

@@ -19,7 +19,7 @@ from analysis.measurements.model import (
     PulseMeasurements,
 )
 from analysis.result import file as result_file
-from recorder.log.jumper_path import jumper_path
+from recorder.log.beside import jumper_path
 from rig.api.jump import LastJump, MeasuredValue
 from rig.api.recordings import RecordingOrder
 from service.measuring.keeping import keep_result

@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from recorder.log.jumper_path import jumper_path
+from recorder.log.beside import jumper_path
 from rig.api.jump import LastJump
 from rig.api.statement import Statement
 from rig.settings.model import AnalysisSettings

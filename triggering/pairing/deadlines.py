@@ -66,7 +66,7 @@ class Deadlines:
         hold = HostNs(pulse.time + self.hold_ns)
         if self._held.count:
             hold = max(hold, self._held.last_end(pulse, hold))
-        if pulse.time <= self._hurry_until or self._train.rhythm_ns is not None:
+        if pulse.time <= self._hurry_until or self._train.rhythm.usual_ns is not None:
             return hold
         lacking = (track for track, frame in zip(self._tracks, pulse.frames, strict=True) if frame is None)
         if not any(track.will_tell and track.may_deliver(pulse.time) for track in lacking):

@@ -239,7 +239,7 @@ class Pairer:
             spread_usual_us=train.spread_usual_ns / 1000,
             alarm=train.alarm,
             cameras=tuple(camera_health(track, train.last) for track in self._tracks),
-            rate_hz=NS_PER_S / train.period_ns if train.steady else None,
+            rate_hz=NS_PER_S / train.period_ns if train.rhythm.steady else None,
             split_us=None if split is None or not is_recent(split[0], train.last) else split[1] / 1000,
             source=source_health(self._fired, train.last),
         )  # fmt: skip

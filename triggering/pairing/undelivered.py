@@ -40,7 +40,7 @@ def undelivered_times(waiting: Sequence[OpenPulse], tracks: Sequence[CameraTrack
     if not any(gap.holes for _, gap in witnesses):
         return []
     room = max(1, train.room(span))
-    if train.steady and room <= _SHORT_ROOM and abs(span / train.period_ns - (room + 1)) <= _WHOLE:
+    if train.rhythm.steady and room <= _SHORT_ROOM and abs(span / train.period_ns - (room + 1)) <= _WHOLE:
         return _spaced(start, span, room, train.period_ns)
     proven = sorted(gap.taken - _room_later(waiting, camera, gap, train) for camera, gap in witnesses)
     count = proven[-1]

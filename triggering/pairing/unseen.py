@@ -115,7 +115,7 @@ def unwatched_time(train: PulseTrain, tracks: Sequence[CameraTrack], following: 
     """
     if train.last is None or any(track.watches() for track in tracks):
         return None
-    rhythm = train.rhythm_ns
+    rhythm = train.rhythm.usual_ns
     if rhythm is None:
         return None
     step = rhythm

@@ -37,6 +37,73 @@ _SPREADS: Final = 3.0
 _LEARN_EVERY: Final = 24
 
 
+class Rhythm:
+    """The period of the pulses, measured from the intervals between them.
+
+    Args:
+        period_ns: nominal period, until one is measured.
+
+    Attributes:
+        period_ns: present estimate of the period.
+        steady: the period is measured, and the last pulses came in it.
+    """
+
+    def __init__(self, period_ns: int) -> None:
+        self.period_ns, self._nominal_ns = float(period_ns), period_ns
+        self.steady = False
+        self._intervals: deque[int] = deque(maxlen=RHYTHM)
+        self._usual: tuple[float | None] | None = None  # computed from the intervals; None: they have changed since
+
+    @property
+    def usual_ns(self) -> float | None:
+        """The period by which an unbroken train goes on, ns; None if the pulses so far do not tell one.
+
+        The mean of the recent intervals is nearer to it than `period_ns`, which follows slowly.
+        """
+        if self._usual is None:
+            self._usual = (self._usual_interval(),)
+        return self._usual[0]
+
+    @property
+    def shortest_ns(self) -> float:
+        """The shortest time between two of the recent pulses; the period if there are none."""
+        return min(self._intervals, default=self.period_ns)
+
+    def add(self, interval: int) -> bool:
+        """Follow the rhythm slowly while it goes on, and take the new one where it has changed.
+
+        Args:
+            interval: the next interval between two pulses, ns.
+
+        Returns:
+            Whether the period was measured anew.
+        """
+        self._intervals.append(interval)
+        self._usual = None
+        deviation = interval - self.period_ns
+        if self.steady and abs(deviation) < AGREE * self.period_ns:
+            self.period_ns += _PERIOD_GAIN * deviation
+            return False
+        recent = list(self._intervals)[-_CHANGE:]
+        if len(recent) == _CHANGE and max(recent) - min(recent) < AGREE * min(recent):
+            if abs(min(recent) - self.period_ns) > AGREE * self.period_ns:
+                self._intervals = deque(recent, maxlen=RHYTHM)  # those before are of another rhythm
+            self.period_ns, self.steady = sum(recent) / _CHANGE, True
+            return True
+        if self.steady and self.usual_ns is None:
+            self.steady, self.period_ns = False, float(self._nominal_ns)
+        return False
+
+    def _usual_interval(self) -> float | None:
+        if len(self._intervals) < RHYTHM_LEAST:
+            return None
+        usual = median_low(self._intervals)
+        reach = ceil(AGREE * usual) - 1  # intervals are whole ns: they agree if they differ by less than the share
+        least, most = usual - reach, usual + reach
+        agreeing = [interval for interval in self._intervals if least <= interval <= most]
+        return sum(agreeing) / len(agreeing) if 2 * len(agreeing) >= len(self._intervals) else None
+
+
 class PulseTrain:
     """Period and spreads, measured from the decided pulses.
 
@@ -46,8 +113,7 @@ class PulseTrain:
         spread_ns: how far apart the trigger itself may expose the cameras, which is allowed for at any time.
 
     Attributes:
-        period_ns: present estimate of the period.
-        steady: the period is measured, and the last pulses came in it.
+        rhythm: the period.
         tolerance_ns: frames whose trigger times are this close are of one pulse.
         widest_ns: frames whose trigger times differ by more are never of one pulse.
         last: time of the last decided pulse.
@@ -55,43 +121,21 @@ class PulseTrain:
     """
 
     def __init__(self, period_ns: int, widest_ns: int | None = None, spread_ns: int = 0) -> None:
-        self.period_ns, self._nominal_ns = float(period_ns), period_ns
-        self.steady = False
+        self.rhythm = Rhythm(period_ns)
         self.last: HostNs | None = None
         self.split: tuple[HostNs, int] | None = None
         self._limit_ns = self.widest_ns = _WIDEST * period_ns if widest_ns is None else float(widest_ns)
         self._least_ns = CLOCKS_NS + spread_ns
         self.tolerance_ns = min(max(_SPREAD_NS, self._least_ns), self.widest_ns)
         self._spreads: deque[int] = deque(maxlen=_RECENT)
-        self._intervals: deque[int] = deque(maxlen=RHYTHM)
-        self._rhythm: tuple[float | None] | None = None  # computed from the intervals; None: they have changed since
         self._delivered = 0
         self._beat: HostNs | None = None  # the last pulse that was not the second half of one
         self._learn_in = _LEARN_EVERY
 
     @property
-    def rhythm_ns(self) -> float | None:
-        """The period by which an unbroken train goes on, ns; None if the pulses so far do not tell one.
-
-        The mean of the recent intervals is nearer to it than `period_ns`, which follows slowly.
-        """
-        if self._rhythm is None:
-            self._rhythm = (self._rhythm_of_intervals(),)
-        return self._rhythm[0]
-
-    def _rhythm_of_intervals(self) -> float | None:
-        if len(self._intervals) < RHYTHM_LEAST:
-            return None
-        usual = median_low(self._intervals)
-        reach = ceil(AGREE * usual) - 1  # intervals are whole ns: they agree if they differ by less than the share
-        least, most = usual - reach, usual + reach
-        agreeing = [interval for interval in self._intervals if least <= interval <= most]
-        return sum(agreeing) / len(agreeing) if 2 * len(agreeing) >= len(self._intervals) else None
-
-    @property
-    def shortest_ns(self) -> float:
-        """The shortest time between two of the recent pulses; the period if there are none."""
-        return min(self._intervals, default=self.period_ns)
+    def period_ns(self) -> float:
+        """Present estimate of the period."""
+        return self.rhythm.period_ns
 
     def is_decided(self, time: HostNs) -> bool:
         """Whether a trigger time is of the last decided pulse, or of an earlier one."""
@@ -122,9 +166,9 @@ class PulseTrain:
                 self.split = time, interval
             else:
                 interval = time - (self._beat or last)
-                self._intervals.append(interval)
-                self._rhythm = None
-                self._follow(interval)
+                if self.rhythm.add(interval):
+                    self.widest_ns = min(self._limit_ns, _WIDEST * self.period_ns)
+                    self.tolerance_ns = min(self.tolerance_ns, self.widest_ns)
                 self._beat = time
         self._delivered = delivered
         if spread_ns > 0:
@@ -138,27 +182,6 @@ class PulseTrain:
         """Whether this pulse and the last one may have been one: close together, and no camera saw both."""
         apart = delivered & self._delivered == 0 and delivered != 0 and self._delivered != 0
         return apart and interval < _SPLIT * self.period_ns
-
-    def _follow(self, interval: int) -> None:
-        """Follow the rhythm slowly while it goes on, and take the new one where it has changed."""
-        deviation = interval - self.period_ns
-        if self.steady and abs(deviation) < AGREE * self.period_ns:
-            self.period_ns += _PERIOD_GAIN * deviation
-            return
-        recent = list(self._intervals)[-_CHANGE:]
-        if len(recent) == _CHANGE and max(recent) - min(recent) < AGREE * min(recent):
-            if abs(min(recent) - self.period_ns) > AGREE * self.period_ns:
-                self._intervals = deque(recent, maxlen=RHYTHM)  # those before are of another rhythm
-                self._rhythm = None
-            self._measured(sum(recent) / _CHANGE)
-            return
-        if self.steady and self.rhythm_ns is None:
-            self.steady, self.period_ns = False, float(self._nominal_ns)
-
-    def _measured(self, period_ns: float) -> None:
-        self.period_ns, self.steady = period_ns, True
-        self.widest_ns = min(self._limit_ns, _WIDEST * period_ns)
-        self.tolerance_ns = min(self.tolerance_ns, self.widest_ns)
 
     def _learn_tolerance(self) -> None:
         self.tolerance_ns = min(max(self._least_ns, _SPREADS * self.spread_usual_ns), self.widest_ns)

@@ -65,7 +65,7 @@ class FrameTimes:
         """
         steps = self.clock.steps
         agrees = self.clock.latch(latch)
-        if agrees and latch.round_trip_ns < self._train.shortest_ns:
+        if agrees and latch.round_trip_ns < self._train.rhythm.shortest_ns:
             self._confirmed = latch
         if stepped := self.clock.steps != steps:
             self._confirmed, self.plausibility.doubted = None, 0

@@ -121,7 +121,7 @@ class Plausibility:
             final: no more evidence can be waited for.
         """
         first = waiting[0]
-        if not self._train.steady:
+        if not self._train.rhythm.steady:
             return Verdict.ACCEPTED if read else Verdict.WAITS
         goes_on = last is not None and self._follows(last, first)
         if goes_on and self.doubted <= _SINGLE and self._arrivals.is_usual(first.latency_ns):

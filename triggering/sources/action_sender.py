@@ -1,7 +1,4 @@
-"""Sends action commands: a thread that keeps the time of the pulses, and a socket whose answers its owner reads.
-
-The thread does nothing but wait and send, so that no answer and no report holds up a pulse.
-"""
+"""Sends action commands: a thread that keeps the time of the pulses, and a socket whose answers its owner reads."""
 
 import os
 import queue
@@ -41,6 +38,83 @@ class _Sent:
     failures: tuple[tuple[str, str], ...]
 
 
+class _Sending:
+    """The thread: does nothing but wait and send, so that no answer and no report holds up a pulse.
+
+    Args:
+        settings: of the rig file.
+        origin: time of a pulse.
+        targets: addresses that each command is sent to.
+        gate: lets pulses through.
+        sender: the socket.
+
+    Attributes:
+        ptp: the cameras' time, for scheduled commands; None: not known.
+        news: the commands, each before it is sent.
+    """
+
+    def __init__(
+        self, settings: ActionTrigger, origin: HostNs, targets: Sequence[str], gate: Gate, sender: socket.socket
+    ) -> None:
+        self.ptp: PtpTime | None = None
+        self.news: queue.SimpleQueue[_Sent] = queue.SimpleQueue()
+        self._settings, self._origin, self._targets = settings, origin, targets
+        self._gate, self._socket, self._keys = gate, sender, ActionKeys.of(origin)
+        self._last_id = 0
+        self._failures: tuple[tuple[str, str], ...] = ()
+        self._stop = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+        self._thread = threading.Thread(target=self._scheduled if settings.scheduled else self._at_once, name="pulses")
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        os.eventfd_write(self._stop, 1)
+        self._thread.join(_STOP_S)
+        os.close(self._stop)
+
+    def _at_once(self) -> None:
+        train = trigger_source(self._settings).sent(self._origin)
+        if train is None:
+            raise RuntimeError("scheduled commands are not sent at once")
+        while True:
+            now = host_now()
+            if train.is_due(now) and self._gate.passes():
+                self._send(None)
+            if self._wait(now + train.until_next_ns(now)):
+                return
+
+    def _scheduled(self) -> None:
+        settings = self._settings
+        train = ScheduledTrain(settings.period_ns, settings.lead_ns, settings.lead_ns // 2)
+        while True:
+            now, wait_ns, ptp = host_now(), _LOOK_NS, self.ptp
+            if ptp is not None:
+                if (time := train.due(now, ptp)) is not None and self._gate.passes():
+                    self._send(time)
+                wait_ns = min(wait_ns, train.until_next_ns(now, ptp))
+            if self._wait(now + wait_ns):
+                return
+
+    def _wait(self, until: int) -> bool:
+        """Wait until a host time; whether the thread is to end."""
+        return bool(select.select([self._stop], [], [], max(0, until - host_now()) / NS_PER_S)[0])
+
+    def _send(self, time: DeviceNs | None) -> None:
+        self._last_id = self._last_id % LAST_REQUEST_ID + 1
+        command = encode_action(self._keys, self._last_id, time)
+        self.news.put(_Sent(self._last_id, host_now(), self._failures))
+        failures = []
+        for target in self._targets:
+            try:
+                self._socket.sendto(command, (target, GVCP_PORT))
+            except OSError as error:
+                failures.append((target, error.strerror or str(error)))
+        self._failures = tuple(failures)
+
+
 class ActionSender:
     """Sends the commands of one rig, from `start` to `stop`.
 
@@ -52,23 +126,17 @@ class ActionSender:
     """
 
     def __init__(self, settings: ActionTrigger, origin: HostNs, cameras: Sequence[tuple[str, str]], gate: Gate) -> None:
-        self._settings, self._origin, self._keys = settings, origin, ActionKeys.of(origin)
-        self._gate, self._names = gate, [name for _, name in cameras]
-        self._targets = settings.broadcast or tuple(address for address, _ in cameras)
+        self._scheduled, self._names = settings.scheduled, [name for _, name in cameras]
         self._account = ActionAccount(cameras)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         self._socket.setblocking(False)
         self._socket.bind(("", 0))
         self._connected: frozenset[int] = frozenset()
-        self._ptp: PtpTime | None = None
         self._astray: tuple[int, ...] = ()
         self._failing: set[str] = set()
-        self._last_id = 0
-        self._failures: tuple[tuple[str, str], ...] = ()
-        self._news: queue.SimpleQueue[_Sent] = queue.SimpleQueue()
-        self._stop = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
-        self._thread = threading.Thread(target=self._scheduled if settings.scheduled else self._at_once, name="pulses")
+        targets = settings.broadcast or tuple(address for address, _ in cameras)
+        self._sending = _Sending(settings, origin, targets, gate, self._socket)
 
     def fileno(self) -> int:
         """Of the socket, for select: it is readable when `read` has something to do."""
@@ -81,14 +149,12 @@ class ActionSender:
 
     def start(self) -> None:
         """Start the thread."""
-        self._thread.start()
+        self._sending.start()
 
     def stop(self) -> None:
         """End the thread and close the socket."""
-        os.eventfd_write(self._stop, 1)
-        self._thread.join(_STOP_S)
+        self._sending.stop()
         self._socket.close()
-        os.close(self._stop)
 
     def seen(self, connected: Sequence[bool], offsets_ns: Sequence[int | None]) -> list[Phrase]:
         """Take over what the recorder knows of the cameras.
@@ -101,10 +167,10 @@ class ActionSender:
             Which clocks show another time than those of the other cameras; said when it begins.
         """
         self._connected = frozenset(index for index, is_there in enumerate(connected) if is_there)
-        if not self._settings.scheduled:
+        if not self._scheduled:
             return []
         there = (offset if is_there else None for offset, is_there in zip(offsets_ns, connected, strict=True))
-        self._ptp = ptp = PtpTime.of(list(there))
+        self._sending.ptp = ptp = PtpTime.of(list(there))
         before, self._astray = self._astray, () if ptp is None else tuple(camera for camera, _ in ptp.astray)
         return [] if ptp is None or set(self._astray) <= set(before) else ptp.words(self._names)
 
@@ -133,8 +199,8 @@ class ActionSender:
     def _take_news(self) -> list[Phrase]:
         """Enter the commands that the thread has sent; say where none can be sent."""
         told = []
-        while not self._news.empty():
-            sent = self._news.get()
+        while not self._sending.news.empty():
+            sent = self._sending.news.get()
             self._account.sent(sent.request_id, sent.time, self._connected)
             failing = {target for target, _ in sent.failures}
             text = "action commands cannot be sent to {address} ({why}): check network port and trigger.broadcast"
@@ -145,44 +211,3 @@ class ActionSender:
             ]
             self._failing = failing
         return told
-
-    # The thread
-
-    def _at_once(self) -> None:
-        train = trigger_source(self._settings).sent(self._origin)
-        if train is None:
-            raise RuntimeError("scheduled commands are not sent at once")
-        while True:
-            now = host_now()
-            if train.is_due(now) and self._gate.passes():
-                self._send(None)
-            if self._wait(now + train.until_next_ns(now)):
-                return
-
-    def _scheduled(self) -> None:
-        settings = self._settings
-        train = ScheduledTrain(settings.period_ns, settings.lead_ns, settings.lead_ns // 2)
-        while True:
-            now, wait_ns, ptp = host_now(), _LOOK_NS, self._ptp
-            if ptp is not None:
-                if (time := train.due(now, ptp)) is not None and self._gate.passes():
-                    self._send(time)
-                wait_ns = min(wait_ns, train.until_next_ns(now, ptp))
-            if self._wait(now + wait_ns):
-                return
-
-    def _wait(self, until: int) -> bool:
-        """Wait until a host time; whether the thread is to end."""
-        return bool(select.select([self._stop], [], [], max(0, until - host_now()) / NS_PER_S)[0])
-
-    def _send(self, time: DeviceNs | None) -> None:
-        self._last_id = self._last_id % LAST_REQUEST_ID + 1
-        command = encode_action(self._keys, self._last_id, time)
-        self._news.put(_Sent(self._last_id, host_now(), self._failures))
-        failures = []
-        for target in self._targets:
-            try:
-                self._socket.sendto(command, (target, GVCP_PORT))
-            except OSError as error:
-                failures.append((target, error.strerror or str(error)))
-        self._failures = tuple(failures)

@@ -101,7 +101,7 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """An offset that is tried, and what speaks against it.
+    """A tried offset, and the evidence against it.
 
     Attributes:
         offset, rate: what is added to the second log's times: `offset + rate * time`, ns since its first pulse.
@@ -172,7 +172,7 @@ class _Aligning:
         return self._aligned(best)
 
     def _best(self, fits: list[_Fit]) -> _Fit:
-        """The best offset of those that explain both logs.
+        """The best offset that explains both logs.
 
         Raises:
             BadInputError: none does: at each, too many pulses are in one log only.
@@ -339,7 +339,7 @@ def _followed(times: Times, residuals: Times) -> tuple[Times, Times]:
 
 
 def _most_unseen(common: int) -> float:
-    """Pulses that may be in one log only, by chance, beside so many that are in both."""
+    """The most pulses that may be in one log only, by chance, beside so many in both."""
     expected = 2 * _UNSEEN * common
     return expected + 5 * math.sqrt(expected) + _PULSES_LEAST
 

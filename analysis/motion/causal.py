@@ -115,10 +115,10 @@ class CausalFilter:
             time: of the pulse.
 
         Returns:
-            A state with all points, also those that were never measured: their covariance tells. And the state in
-            which what was not seen for long is taken to be where people have it: that tells where to look, but not what
-            is there: a binding could be the other one. The filter itself never knows it: told at each pulse anew, it
-            would count as often.
+            A state with all points; points that were never measured have a large covariance. And a second state, in
+            which points and skis out of sight for long are where a body has them. It shows where to look, not what is
+            there: a binding could be the other one. The filter itself does not use it: entered again at every pulse,
+            the same knowledge would count many times.
         """
         if self._frame is None:
             return None
@@ -270,7 +270,7 @@ class CausalFilter:
         hands: Sequence[Mapping[str, bool]],
         known: Flags,
     ) -> list[SmoothedState]:
-        """The states of k beliefs at the pulse of which `cameras` and `hands` tell who measured."""
+        """The states of k beliefs at one pulse; `cameras` and `hands` are the sources of its measurements."""
         return smoothed_states(
             frame,
             self._unit,
@@ -301,7 +301,7 @@ def _plausible(observed: Observations, distances: Floats) -> Flags:
     """Which measurements (1, m, 6) agree with a prediction, by their chi-squares against it.
 
     Two images of a ski, or one, do not contradict each other whatever they show; there the prediction is the only
-    control, and judges as strictly as the motion over time does afterwards. What a hand measured is believed.
+    control, and judges as strictly as the motion over time does afterwards. Measurements by hand are exempt from that.
     """
     distance = distances.reshape(observed.seen.shape)
     used = observed.seen & (distance < chdtri(2, _GATE_P))

@@ -69,7 +69,7 @@ def _shifted(observed: Observations, flat: Floats, late: Floats) -> Floats:
 
 
 def _earlier(times: Floats, values: Floats, late: Floats) -> Floats:
-    """Values (t, n, ...) at times (n,) of what is t times late, from those (n, ...) with lateness.
+    """Values (t, n, ...) earlier than times (n,) by each of t latenesses, from the values (n, ...) at these times.
 
     Linear between neighbouring pulses; NaN where one of them has no value.
     """

@@ -80,7 +80,7 @@ def judged(
 
 
 def _reference(able: list[int], lateness: Floats, covariance: Floats) -> list[int]:
-    """The cameras that agree: one after the other is left out, each time the one that contradicts most."""
+    """The cameras that agree: the camera with the largest contradiction is left out, then the next."""
     chosen = able
     while len(chosen) > 1 and _contradiction(lateness, covariance, chosen) > chdtri(len(chosen) - 1, FALSE_ALARM_P):
         if len(chosen) == 2:

@@ -1,4 +1,4 @@
-"""Gives up what too few images control, where the motion over time contradicts it.
+"""Rejects points and skis with too few images to check them, where the motion over time contradicts them.
 
 Two images hardly contradict each other, whatever they show. There, and where a third one has next to no weight, the
 motion is the only control (decision 0063).
@@ -50,7 +50,7 @@ class ExpectedSkis:
 
 
 def give_up_points(points: Objects, checked: Checked, calibration: Floats, expected: ExpectedPoints) -> Checked:
-    """Give up points that contradict the motion by images that the others do not control.
+    """Reject points that contradict the motion, if no other image checks theirs.
 
     Nothing moves, and what several other images control stays as they have it, whatever the motion says.
 
@@ -75,7 +75,7 @@ def give_up_points(points: Objects, checked: Checked, calibration: Floats, expec
 
 
 def give_up_skis(skis: SkiLines, checked: Checked, expected: ExpectedSkis) -> Checked:
-    """Give up skis of two images whose direction contradicts the motion; not those that a hand measured.
+    """Reject skis of two images if their direction contradicts the motion; skis measured by hand stay.
 
     Args:
         skis: n skis.

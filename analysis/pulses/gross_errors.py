@@ -54,7 +54,7 @@ def check_points(points: Objects, adjusted: Adjusted, calibration: Floats) -> Ch
 
 
 def check_skis(skis: SkiLines, adjusted: Adjusted, calibration: Floats) -> Checked:
-    """Leave out images in which right and left are interchanged, or that are wrong otherwise.
+    """Leave out images with right and left interchanged, and other wrong images.
 
     Args:
         skis: n skis, right and left in turn.
@@ -120,7 +120,7 @@ def _clear_best(chi: Floats) -> NDArray[np.int_]:
 
 
 def _interchanged(skis: SkiLines, calibration: Floats, first: Adjusted) -> tuple[Flags, Flags]:
-    """Images (n, m) in which right and left ski are interchanged, and skis (n,) where it cannot be told in which."""
+    """Images (n, m) with right and left ski interchanged, and skis (n,) for which this image cannot be found."""
     n, m = skis.seen.shape
     found, unclear = np.zeros((n, m), bool), np.zeros(n, bool)
     both = skis.seen & skis.seen[np.arange(n) ^ 1]

@@ -121,7 +121,7 @@ def points_of(
 
 
 def of_objects(ways: Iterable[Floats | None], size: tuple[int, int], objects: int) -> Iterator[Floats]:
-    """Ways (pulses objects, m, 3) of all objects, from those (pulses, m, 3) that all objects of a pulse share.
+    """Ways (pulses objects, m, 3) of all objects, from the ways (pulses, m, 3) shared by the objects of a pulse.
 
     Args:
         ways: of a pulse and a camera; None: nobody moves.

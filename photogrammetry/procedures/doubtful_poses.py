@@ -1,4 +1,4 @@
-"""Poses that must not be believed: one of several, not those that were given, or those of exchanged cameras."""
+"""Doubtful poses: one of several possible ones, poses other than the given ones, poses of exchanged cameras."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

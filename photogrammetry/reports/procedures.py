@@ -25,7 +25,7 @@ def calibration_lines(calibration: Calibration) -> list[str]:
 
 
 def calibration_report(calibration: Calibration, wishes: Wishes = NOTHING) -> Report:
-    """The whole report of a calibration, with what was asked for beside."""
+    """The whole report of a calibration, with the further tables that were asked for."""
     notes = calibration.notes or ("All parameters are significant, and none is hard to tell from another.",)
     procedure = "Free adjustment of a 3D frame of unknown targets with self-calibration; inner constraints."
     sections = (Section("Procedure", (procedure, *notes)), *adjusted_sections(calibration.outcome, wishes))
@@ -59,7 +59,7 @@ def orientation_lines(orientation: Orientation) -> list[str]:
 
 
 def orientation_report(orientation: Orientation, wishes: Wishes = NOTHING) -> Report:
-    """The whole report of a pose estimation, stage by stage, with what was asked for beside."""
+    """The whole report of a pose estimation, stage by stage, with the further tables that were asked for."""
     stages = [
         Section(f"Stage {number}: {stage.name.value}", (stage.words, *_findings(stage), *_tests(stage)))
         for number, stage in enumerate(orientation.stages, start=1)

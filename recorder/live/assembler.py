@@ -123,7 +123,7 @@ class Assembler:
         # A camera whose frame waits for a buffer has unread records. The pairer must not see a later time than that
         # frame's, or it would take the unread frames for missing ones.
         waiting = self._composer.waiting_since()
-        # Frames that wait to be believed hold buffers for which others wait: their wait ends in real time.
+        # Frames that wait to be accepted hold buffers for which others wait: their wait ends in real time.
         self._place_released(now)
         self._decided.extend(self.pairer.advance(now if waiting is None else waiting))
         self.cameras.look(now)
@@ -163,7 +163,7 @@ class Assembler:
                 ring.release(record.slot)
 
     def _place_released(self, now: HostNs) -> None:
-        """Copy or drop the frames that have waited in their rings until their trigger times could be believed."""
+        """Copy or drop the frames that have waited in their rings until their trigger times were judged."""
         for camera, record, pulse in self.pairer.released(now):
             if pulse is None:
                 self._rings[camera].release(record.slot)

@@ -73,7 +73,7 @@ class _WarmUp:
         self._times: deque[HostNs] = deque(maxlen=_RATE_PULSES)
 
     def add(self, pulse: ClosedPulse) -> RecorderWarm | None:
-        """Take in the next pulse; returns what is to be reported, which is seldom anything."""
+        """Take in the next pulse; returns the report that is due, seldom one."""
         self._whole = self._whole + 1 if pulse.complete else 0
         self._times.append(pulse.time)
         if self._whole not in {_WARM_PULSES, _RATE_PULSES}:

@@ -64,7 +64,7 @@ class OpeningLog:
             self.log.give_up(error)
 
     def discard(self) -> threading.Thread:
-        """Remove a log that has no pulse, open or not; the thread that is returned ends when that is done."""
+        """Remove a log without a pulse, open or not; the returned thread ends when it is removed."""
 
         def run() -> None:
             wait([self._future])

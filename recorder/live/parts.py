@@ -25,7 +25,7 @@ _GB: Final = 1e9
 
 @dataclass(frozen=True, slots=True)
 class _Account:
-    """What is reported of a log: of one that is closed nothing else is kept."""
+    """The report on a log; of a closed one nothing else is kept."""
 
     part: LogPart
     first_time: UtcNs | None
@@ -75,7 +75,7 @@ class Parts:
         self._refused_s = self._refused_bytes = 0
 
     def settle(self, now: HostNs) -> None:
-        """Account for what is in the files by now; keep of a log that is closed only its account."""
+        """Account for the pulses in the files; of a closed log keep only its account."""
         for each in self.earlier:
             each.confirm(now)
         while self.earlier and self.earlier[0].settled and (self.earlier[0].ending.next_part or len(self.earlier) > 1):

@@ -374,7 +374,7 @@ class Recording:
         return self._order.part_s, self._order.part_gb
 
     def continuation(self, path: Path, *, part: bool = False) -> StartRecording:
-        """The order for a recording that continues this one in another log, which is its next `part` or not."""
+        """The order for going on in another log: as the next `part`, or after a failure."""
         return msgspec.structs.replace(self._order, path=path, goes_on=None, part_of=self.id if part else "")
 
     def part(self) -> LogPart:

@@ -279,7 +279,7 @@ class Recordings:
             recording.begin_close()
 
     def _note_trouble(self, recording: Recording) -> None:
-        """Note in a log that ends what its disk cost."""
+        """Note in an ending log what its disk cost."""
         recording.ending.trouble = self._watch.trouble(recording.account.ledger.causes[FrameStatus.LOST])
 
     def _finish(self, recording: Recording) -> None:
@@ -372,7 +372,7 @@ class Recordings:
             self._fail(recording, wording.reserve_reached(recording.path, why), whole=True)
 
     def _decide_now(self) -> None:
-        """Take in the pulses that would have waited for what later ones may tell."""
+        """Take in the pulses that would have waited for the evidence of later ones."""
         now = host_now()
         self._assembler.pairer.hurry(now)
         for triplet in self._assembler.pump(now):

@@ -1,4 +1,4 @@
-"""Alarms that follow from a single health record: clocks, trigger and rate that contradict each other at present."""
+"""Alarms that follow from a single health record: clocks, trigger and rate contradict each other at present."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final

@@ -14,7 +14,7 @@ _KNOWN_PULSES: Final = 100
 
 
 def set_up_only(source: TriggerSource, health: PairingHealth) -> Phrase | None:
-    """The warning that frames are not to be measured in, with what to do; None: they may be, or none have come yet.
+    """The warning not to measure in these frames, with what to do; None: they are good, or none have come yet.
 
     Args:
         source: of the pulses.

@@ -37,7 +37,7 @@ _SPREAD_PULSES: Final = 24
 
 
 class Stopped:
-    """Finds that pulses which came in a rhythm have stopped.
+    """Notices when pulses stop that came in a rhythm.
 
     Args:
         commanded: this computer commands each camera; there is no cable that may be cut.

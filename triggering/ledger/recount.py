@@ -129,7 +129,7 @@ class Recount:
         self._delay = Delay()
 
     def add(self, tag: TripletTag) -> None:
-        """Take the next tag; one that comes twice or too late is left out."""
+        """Take the next tag; a repeated or late one is left out."""
         if self._held is not None:
             if tag.pulse <= self._held.pulse:
                 return

@@ -116,7 +116,7 @@ class Recounted:
 
     @property
     def misfiled(self) -> tuple[Difference, ...]:
-        """Of the differences, those of whole frames: their numbers and times say that they are of other pulses.
+        """The differences of whole frames: by their numbers and times these are of other pulses.
 
         The others concern the cause of a missing frame.
         """

@@ -63,7 +63,7 @@ class SourceRecount:
         self._live: list[tuple[int, SourcePairing]] = []
 
     def add(self, tag: TripletTag) -> None:
-        """Take the next tag; one that is not later than the last, or that no recorder writes, is left out."""
+        """Take the next tag; a tag not later than the last, or of a kind no recorder writes, is left out."""
         if not _credible(tag.pulse, tag.time) or (self._times and tag.time <= self._times[-1]):
             return
         statuses = {camera.status for camera in tag.cameras}

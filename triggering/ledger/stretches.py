@@ -53,7 +53,7 @@ class Run:
     late: float = 0
 
     def take(self, pulse: PulseNumber, late: float | None, nearest: int, farther: int) -> None:
-        """Take the next frame, which arrived `late` ns after its pulse; None: that says nothing."""
+        """Take the next frame; it arrived `late` ns after its pulse, None: its arrival is no evidence."""
         self.nearest, self.farther = min(self.nearest, nearest), min(self.farther, farther)
         self.last = pulse
         if late is not None:
@@ -72,7 +72,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Pulses that hold frames of a camera that belong to other pulses.
+    """Pulses with frames of a camera that belong to other pulses.
 
     Attributes:
         first, last: its pulses.

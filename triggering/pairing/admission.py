@@ -99,7 +99,7 @@ class Admission:
                 self._refuse(camera, waiting[0])
 
     def _settle_first(self, camera: int) -> Iterator[FrameRecord]:
-        """Accept or refuse the first frame of a camera that waits, which has waited for as long as it may."""
+        """Accept or refuse the first waiting frame of a camera, whose time to wait is over."""
         waiting = self._held.frames(camera)
         if waiting:
             track = self._tracks[camera]

@@ -25,7 +25,7 @@ class Released(NamedTuple):
 
 
 class HeldFrames:
-    """The frames that wait, and those that have waited.
+    """The waiting frames, and the released ones.
 
     Args:
         cameras: how many cameras there are.
@@ -37,7 +37,7 @@ class HeldFrames:
         self.count = 0
 
     def hold(self, camera: int, record: FrameRecord | DamagedRecord) -> None:
-        """Let a frame wait behind those of its camera that wait already."""
+        """Let a frame wait behind its camera's other waiting frames."""
         self._queues[camera].append(record)
         self.count += 1
 
@@ -54,7 +54,7 @@ class HeldFrames:
         return [camera for camera, end in self._ends() if now >= end]
 
     def last_end(self, pulse: OpenPulse, arrived: HostNs) -> HostNs:
-        """Until when the frames that wait may still be accepted for a pulse that lacks them.
+        """Until when waiting frames may still be accepted for a pulse without them.
 
         Args:
             pulse: an open one.
@@ -95,7 +95,7 @@ class HeldFrames:
         return None
 
     def release(self, camera: int, record: FrameRecord, pulse: OpenPulse | None) -> None:
-        """Note what became of a frame that was taken out."""
+        """Note the pulse of a frame that was taken out."""
         self._released.append(Released(camera, record, pulse))
 
     def released(self) -> list[Released]:

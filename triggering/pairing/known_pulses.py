@@ -1,4 +1,4 @@
-"""The pulses that are known: those that are open, in the order of time, and the last decided ones."""
+"""The known pulses: the open ones, in the order of time, and the last decided ones."""
 
 from bisect import bisect_left, bisect_right, insort
 from collections import deque
@@ -89,7 +89,7 @@ class KnownPulses:
             yield pulse
 
     def nearest_decided(self, time: HostNs, cameras: int) -> tuple[HostNs, int] | None:
-        """Time of the decided pulse nearest to a time of which one of some cameras delivered a frame, and which did.
+        """The decided pulse nearest to a time, of those seen by one of `cameras`: time, and all cameras that saw it.
 
         Args:
             time: the time.

@@ -55,7 +55,7 @@ class OtherCameras:
         return True if at and not self._outvoted(at | own, beside) else near
 
     def _outvoted(self, those: int, beside: Sequence[tuple[HostNs, int]]) -> bool:
-        """Whether another camera than those has a frame at a pulse of which this one has none, not even one that waits.
+        """Whether another camera than those has a frame at a pulse for which this one has none, not even a waiting one.
 
         Args:
             those: one bit each.

@@ -1,4 +1,4 @@
-"""Finds the pulses of which no camera delivered a frame, where the frame ids prove that they fired.
+"""Finds pulses without a frame of any camera, where the frame ids prove that they fired.
 
 If a camera's ids say that it took more frames between two whole ones than there are known pulses in between, it exposed
 a frame at an unknown pulse. That pulse fired and gets its tag. In a gap of a few whole periods of a measured rhythm the

@@ -97,7 +97,7 @@ class UnseenPulses:
         return True
 
     def _proven(self, head: OpenPulse, waiting: Sequence[OpenPulse]) -> list[OpenPulse]:
-        """The pulses that the frame ids prove before the first open one, which is about to be decided."""
+        """The pulses proven by frame ids before the first open one, which is about to be decided."""
         if head.proven_by_ids or head.fired or head is self._examined:
             return []
         self._examined = head

@@ -75,7 +75,7 @@ class ActionAccount:
         self._open.append(_Command(request_id, now, set(cameras)))
 
     def answered(self, address: str, answer: Acknowledge, now: HostNs) -> None:
-        """Enter an answer; one of a stranger, one that comes twice or too late counts nothing."""
+        """Enter an answer; an answer of a stranger, a repeated or a late one is not counted."""
         camera = self._of_address.get(address)
         # The last command comes first: an id that was used again belongs to it.
         command = next((each for each in reversed(self._open) if each.request_id == answer.request_id), None)

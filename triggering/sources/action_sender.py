@@ -175,7 +175,7 @@ class ActionSender:
         return [] if ptp is None or set(self._astray) <= set(before) else ptp.words(self._names)
 
     def read(self) -> list[Phrase]:
-        """Read the answers that have come, and give up those that are overdue; to be called often.
+        """Read the answers, and stop waiting for overdue ones; to be called often.
 
         Returns:
             What has begun to go wrong.

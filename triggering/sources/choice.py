@@ -34,7 +34,7 @@ from triggering.sources.triggerbox.protocol import nearest_rate
 
 @dataclass(frozen=True, slots=True)
 class TriggerSource:
-    """A source of trigger pulses, as those see it who command cameras and who pair frames.
+    """A source of trigger pulses, for those who command cameras and pair frames.
 
     Attributes:
         advice: what to do if all cameras are ready, but its pulses give no complete triplet.

@@ -1,4 +1,4 @@
-"""The PTP time that the cameras share, from the readings of their clocks, and which camera does not share it."""
+"""The PTP time that the cameras share, from the readings of their clocks, and the cameras without it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

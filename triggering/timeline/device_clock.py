@@ -153,7 +153,7 @@ class DeviceClock:
         self._fit()
 
     def _begins_at_zero(self, latch: ClockLatch) -> bool:
-        """Whether a clock that went back shows no more than the time since the last reading that agreed."""
+        """Whether a clock that went back shows no more than the time since its last consistent reading."""
         before = self._newest
         if before is None or not 0 <= latch.device < before.device:
             return False

@@ -1,4 +1,4 @@
-"""Compares the pulses that the source reports with the pulses that the cameras saw.
+"""Compares the pulses reported by the source with the pulses seen by the cameras.
 
 A pulse of which no camera has a frame is in the log all the same if the source reports it, and each decided pulse is
 compared with the reports. A report comes some time after its pulse, so a pulse behind a gap waits for it; in an

@@ -103,8 +103,8 @@ def begun(model: Model, states: Floats, used: Flags, shared: Floats) -> Adjusted
 def near(model: Model, states: Floats, shared: Floats) -> Flags:
     """Which groups (n, m, 6) are about as near to approximate states as most of their kind are.
 
-    An adjustment cannot begin with gross errors: they would turn the cameras. Those that it left out for nothing, it
-    takes back (`without_gross_errors`).
+    An adjustment cannot begin with gross errors: they would turn the cameras. Measurements that were left out without
+        need come back later (`without_gross_errors`).
     """
     channels = np.einsum("id,ndc->nic", _instants(model, shared), states.reshape(len(states), 3, CHANNELS))
     v = _linearised(model, shared, channels).v
@@ -231,7 +231,7 @@ def _embedded(blocks: Floats) -> Floats:
 
 
 def _add_shared(model: Model, shared: Floats, corner: Floats, right: Floats) -> None:
-    """Add what is known of the shared unknowns: u, the lateness of each camera, and whose mean the clock is."""
+    """Add what is known of the shared unknowns: u, the lateness of each camera, and the mean that is the clock."""
     rank = model.root.shape[1]
     off = shared[rank:] - model.late
     weight = np.diag(model.late_sigma**-2.0)

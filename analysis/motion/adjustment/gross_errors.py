@@ -1,10 +1,11 @@
 """Gross errors in the bundle: tests of every measurement, alone and together with its neighbours in time.
 
-An error of one image is far from what all other measurements say. One that lasts is not, if little else determines the
-same: a marker half behind an arm, or a shadow taken for the ski, is wrong in the same way for some tenths of a second,
-and each of its measurements agrees with the others. So all measurements of a thing in one camera within such a time are
-tested together for an error that they share. As in networks, nothing is accused beside a rival that explains as
-much (Baarda's data snooping with two alternatives); of measurements in plenty, suspect and rivals are all left out.
+An error of one image is far from what all other measurements say. A lasting error is not, where few other measurements
+determine the same quantity: a marker half behind an arm, or a shadow taken for the ski, is wrong in the same way for
+some tenths of a second, and each of its measurements agrees with the others. So all measurements of a thing in one
+camera within such a time are tested together for an error that they share. As in networks, no measurement is left out
+alone if a rival explains as much (Baarda's data snooping with two alternatives); of measurements in plenty, suspect and
+rivals are all left out.
 """
 
 from dataclasses import dataclass, replace
@@ -78,7 +79,7 @@ def with_factors(adjusted: Adjusted) -> Adjusted:
 
 
 def without_gross_errors(adjusted: Adjusted, most: int) -> Adjusted:
-    """Leave out measurements that contradict all others, the worst around first; take back those that no longer do.
+    """Leave out measurements that contradict all others, the worst around first; take them back once they agree.
 
     Where two of a point's rays had to go and a single one is left, nothing tells that it is the right one: it goes too.
     So do those few of a camera that stand among more that had to go (`deserted`).
@@ -216,7 +217,7 @@ class _Windows:
     single: Floats
 
     def tests(self, which: Integers) -> Floats:
-        """Tests (t,) of windows (t, k) together: that they have errors that single measurements have not.
+        """Tests (t,) of windows (t, k) for an error that their measurements share.
 
         Chi-squared of two degrees of freedom for each of the k windows.
         """

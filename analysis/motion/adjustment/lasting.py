@@ -1,4 +1,4 @@
-"""Errors that last: what they do to a motion that was adjusted as if those of all images were independent.
+"""The effect of lasting errors on a motion that was adjusted as if the errors of all images were independent.
 
 What puts the axis of a ski off in an image, the other ski, a leg or a boot beside it, an edge in the light, a width
 that is not quite known, puts it off alike in the next images of that camera; likewise what is beside a marker. More
@@ -182,7 +182,7 @@ def _add_effect(
 
 
 def _alike(adjusted: Adjusted, own: list[Run]) -> Floats:
-    """Correlations (2, w, w) of the lasting errors of w runs: of what fades, and of what stays."""
+    """Correlations (2, w, w) of the lasting errors of w runs: of the fading part, and of the constant one."""
     middle = np.array([adjusted.model.observed.times[run.pulses].mean() for run in own])
     fading = np.exp(-np.abs(middle[:, None] - middle) / LASTING_S)
     return np.stack((fading, np.ones_like(fading)))

@@ -1,4 +1,4 @@
-"""How large errors are that last: variance components, from what the residuals of an adjustment say about them."""
+"""The size of lasting errors: variance components, estimated from the residuals of an adjustment."""
 
 from dataclasses import dataclass
 from typing import Final

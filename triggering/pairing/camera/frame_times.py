@@ -141,7 +141,7 @@ class FrameTimes:
         return None if self._confirmed is None else self.arrivals.change_ns(self._confirmed.host)
 
     def learn_latencies_anew(self) -> None:
-        """Believe the camera again: its frames come later or sooner than before, and nothing else is against it."""
+        """Doubt the camera no longer: its frames come later or sooner than before, all else agrees."""
         self.arrivals.forget()
         self.plausibility.doubted = 0
 

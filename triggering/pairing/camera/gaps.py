@@ -137,7 +137,7 @@ class DamageMatcher:
 
 
 class Gaps:
-    """The gaps of one camera: those that have ended, and the running one, which begins with the last whole frame.
+    """The gaps of one camera: the ended ones, and the running one since the last whole frame.
 
     Args:
         train: the rhythm of the pulses.

@@ -145,7 +145,7 @@ class Plausibility:
         return Verdict.REJECTED if evidence.closed or several else Verdict.WAITS
 
     def _is_sound(self, evidence: _Evidence) -> bool:
-        """Whether arrivals confirm a group, its first frame too, which may be the last whose time was off."""
+        """Whether arrivals confirm a group with its first frame; the time of that one alone may still be off."""
         if self._arrivals.scatter:
             return self._has_room(evidence)
         return evidence.arrivals.confirms and self._is_first_sound(evidence)

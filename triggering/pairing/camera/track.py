@@ -132,7 +132,7 @@ class CameraTrack:
         return None
 
     def judge(self, waiting: Sequence[FrameRecord], others: Others, *, final: bool = False) -> Verdict:
-        """Judge the first of the whole frames that wait, by all that is known.
+        """Judge the first waiting whole frame, by all evidence.
 
         Args:
             waiting: the frames, in the order of their arrival.
@@ -155,7 +155,7 @@ class CameraTrack:
         self.damaged(record.host_time)
 
     def waits(self, record: FrameRecord) -> None:
-        """Note that a whole frame has come that is not accepted yet: the camera is neither silent nor overdue."""
+        """Note a whole frame that is not accepted yet: the camera is neither silent nor overdue."""
         self.activity.heard = record.host_time
         self._stir()
 
@@ -222,7 +222,7 @@ class CameraTrack:
         return self.presence.was_away(time)
 
     def settle(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
-        """Decide what became of a pulse for which the camera has delivered no whole frame.
+        """Decide what became of a pulse without a whole frame of the camera.
 
         Args:
             time: time of the pulse; pulses are decided in the order of time.
@@ -251,7 +251,7 @@ class CameraTrack:
         return NO_FRAME[FrameStatus.ABSENT] if outcome.status is FrameStatus.MISSED else outcome
 
     def settle_fired(self, time: HostNs, rivals: Sequence[HostNs]) -> Outcome:
-        """As `settle`, for a pulse that the source fired, and of which no camera delivered a frame.
+        """As `settle`, for a pulse that the source fired and no camera delivered a frame of.
 
         A camera whose clock was read after the pulse was there. If its ids cannot tell, the pulse did not reach it:
         a fault of the cable keeps a pulse from all cameras, a fault of the transfer mostly concerns one camera.

@@ -118,7 +118,7 @@ class TriggerBox:
         return None
 
     def _ask_name(self, end: float) -> str | None:
-        """Ask a box that has just begun for its name, so that it waits no longer; None: it does not answer."""
+        """Ask a box that has just begun for its name, which ends its wait; None: it does not answer."""
         self._line.set_speed(protocol.NAME_BAUD)
         came, name = b"", None
         while name is None and time.monotonic() < end and not self._stopping():

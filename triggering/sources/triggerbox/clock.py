@@ -100,7 +100,7 @@ class BoxClock:
         """Enter a reading.
 
         Returns:
-            Whether it agrees with those before; one that does not is left out.
+            Whether it agrees with the readings before; otherwise it is left out.
         """
         if not self._agrees(reading):
             self.contradicted += 1

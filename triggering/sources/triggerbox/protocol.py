@@ -107,7 +107,7 @@ class Answer:
 
     @property
     def fired(self) -> int:
-        """Number of the pulse whose edge rose last: one that has not fallen yet is not counted yet."""
+        """Number of the pulse whose edge rose last: the box counts a pulse only when it has fallen."""
         return self.count + (self.ticks < WIDTH_TICKS)
 
     @property
@@ -141,7 +141,7 @@ class AnswerReader:
         self.garbage = 0
 
     def feed(self, data: bytes) -> list[Answer]:
-        """Enter what has come; the answers that are whole now."""
+        """Enter received bytes; returns the answers that are whole now."""
         self._bytes += data
         found = []
         while len(self._bytes) >= self._LENGTH:

@@ -209,12 +209,12 @@ def judge_pulses(rig: RigSettings, alarms: list[str], report: VerifyReport) -> I
     ledger = report.ledger
     text = "{pulses} pulses recorded, {complete} complete"
     said = phrase("check_rehearsed", text, pulses=ledger.pulses, complete=ledger.complete)
-    away = {name for name, states in ledger.failures.items() if states == {FrameStatus.ABSENT: ledger.pulses}}
+    away = {name for name, states in ledger.failed.cameras.items() if states == {FrameStatus.ABSENT: ledger.pulses}}
     if ledger.whole:
         yield judged(Level.PASS, Topic.CAMERAS, said, "")
     elif (
         away
-        and away == set(ledger.failures)
+        and away == set(ledger.failed.cameras)
         and not ledger.pauses()
         and len(rig.cameras) - len(away) >= (rig.least_cameras)
     ):

@@ -149,7 +149,7 @@ def read_entry(path: Path) -> Entry:
         path.stem, found.bytes, UtcNs(stat.st_mtime_ns), _state(found),
         started=ledger.first_time, duration_s=ledger.duration_s,
         pulses=ledger.pulses, complete=ledger.complete, missing=found.missing_pulses,
-        causes=dict(ledger.causes), failures=ledger.failures, pauses=ledger.pauses(),
+        causes=dict(ledger.failed.causes), failures=ledger.failed.cameras, pauses=ledger.pauses(),
         cameras=found.cameras, shape=found.shape, session=found.session, rig=found.rig.get("name", ""),
         disk=found.disk, forgotten_s=found.forgotten_s, ended_early=found.ended_early_said,
         next_part=found.next_part, parts=(path.stem,),

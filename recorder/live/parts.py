@@ -173,7 +173,7 @@ class Parts:
         """Stop waiting for the disk: what it has not closed by now has failed."""
         last.confirm(host_now())
         for each in (last, *self.earlier):
-            each.release()
+            each.in_flight.release()
         if last.ending.failure is None:
             last.ending.failure = last.opening.unclosed()
 
@@ -188,7 +188,7 @@ class Parts:
             The report of the recording's end.
         """
         for each in (last, *self.earlier):
-            each.forget()
+            each.in_flight.forget()
         *before, end = self._accounts(last)
         failure = last.ending.failure or next((each.gone for each in before if each.gone is not None), None)
         told = self.progress(last)

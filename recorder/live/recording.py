@@ -129,6 +129,7 @@ class Recording:
         span: which pulses belong to the recording.
         account: from when until when the log tells of every pulse, and what became of those in the file.
         ending: how the log ends.
+        in_flight: its pulses that are not known to be in the file, or are kept.
         opening: the log, on its way to being open.
         continues: id of the recording that this one continues, empty if none.
         mishap: whether it was stopped as soon as it had begun: its pulses belong to the next recording too.
@@ -143,7 +144,7 @@ class Recording:
         anchor = UtcAnchor.take() if after is None or part == 1 else after.account.anchor
         period_ns = rig.trigger.period_ns
         self._tagger = Tagger(rig, anchor, session_name, order.recording)
-        self._in_flight = InFlight(buffers)
+        self.in_flight = InFlight(buffers)
         self.ending = Ending()
         self.mishap = False
         self.continues = ""
@@ -215,7 +216,7 @@ class Recording:
     @property
     def size(self) -> int:
         """Bytes of the log with everything that was handed to it, as far as is known; its end is not in it."""
-        return self._writer.size + len(self._in_flight) * self._assembler.buffers.layout.slot_bytes
+        return self._writer.size + len(self.in_flight) * self._assembler.buffers.layout.slot_bytes
 
     def finished(self) -> bool:
         """Whether no further pulse belongs to the recording, provided that all decided pulses were offered."""
@@ -225,10 +226,6 @@ class Recording:
         """Let none of its pulses wait for what later ones may tell, once its end has come."""
         if self.span.end is not None and now > self.span.end:
             self._assembler.pairer.hurry(self.span.end)
-
-    def stop(self) -> None:
-        """End with the last pulse that has fired until now, or before if that was planned."""
-        self.span.stop(host_now())
 
     def end_early(self, why: Phrase) -> None:
         """End with the last pulse that was handed to the log, before the recording was to end."""
@@ -251,7 +248,7 @@ class Recording:
             StorageError: writing has ended.
         """
         self.span.count(held.triplet.pulse)
-        self._in_flight.add(held, tag)
+        self.in_flight.add(held, tag)
         if slot is not None:
             self._assembler.buffers.hold(slot)
         self._writer.write_pulse(tag, slot, self.utc(held.ready), encoded)
@@ -263,43 +260,27 @@ class Recording:
         """
         keeping = self.mishap or now < self.span.commanded + round(self._order.keep_s * NS_PER_S)
         if self.log is not None:
-            self._in_flight.confirm(self.log.pulses, self.account.ledger)
+            self.in_flight.confirm(self.log.pulses, self.account.ledger)
         if not keeping:
-            self.forget()
-
-    def forget(self, least_free: int | None = None) -> None:
-        """Release the triplet buffers of pulses that were kept, the oldest first.
-
-        Args:
-            least_free: only until so many buffers are free; None: all of them.
-        """
-        self._in_flight.forget(least_free)
-
-    def take_kept(self) -> list[Held]:
-        """Remove and return the pulses that were kept, oldest first; their slots are the caller's."""
-        return self._in_flight.take_kept()
+            self.in_flight.forget()
 
     @property
     def settled(self) -> bool:
         """Whether nothing happens to the log any more, and all pulses in it are accounted for."""
-        return (self.log is None or self.log.over) and self.all_written and not self._in_flight.keeps
+        return (self.log is None or self.log.over) and self.all_written and not self.in_flight.keeps
 
     @property
     def all_written(self) -> bool:
         """Whether every pulse that was handed to the log is in the file."""
-        return not len(self._in_flight)
+        return not len(self.in_flight)
 
     def take_back(self) -> list[Held]:
         """Remove and return the pulses that are not in the file, in order, for another log; for use after a failure."""
-        left = self._in_flight.take_back()
+        left = self.in_flight.take_back()
         for held in left:
             self.span.count(held.triplet.pulse, -1)
         self.span.over = False
         return left
-
-    def release(self) -> None:
-        """Release the triplet buffers of the pulses that are not in the file and never will be."""
-        self._in_flight.release()
 
     @property
     def is_there(self) -> bool:

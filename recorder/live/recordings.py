@@ -131,7 +131,7 @@ class Recordings:
         """
         if self._recording is None:
             return
-        self._recording.stop()
+        self._recording.span.stop(host_now())
         self._recording.mishap = keep and self._parts.is_first
         if at_once:
             self._give_up(self._recording, wording.stopped_at_once(self._recording.path), may_continue=False)
@@ -149,7 +149,7 @@ class Recordings:
         self._parts.settle(now)
         if recording is not None:
             recording.confirm(now)
-            recording.forget(least_free=self._assembler.buffers.count - self._preroll.triplets)
+            recording.in_flight.forget(least_free=self._assembler.buffers.count - self._preroll.triplets)
             writing = self._phase in {_Phase.RUNNING, _Phase.FLUSHING}
             if writing and recording.log is not None and recording.log.error is not None:
                 self._fail(recording, recording.log.error)
@@ -280,14 +280,14 @@ class Recordings:
 
     def _note_trouble(self, recording: Recording) -> None:
         """Note in an ending log what its disk cost."""
-        recording.ending.trouble = self._watch.trouble(recording.account.ledger.causes[FrameStatus.LOST])
+        recording.ending.trouble = self._watch.trouble(recording.account.ledger.failed.causes[FrameStatus.LOST])
 
     def _finish(self, recording: Recording) -> None:
         """Report the end of the recording."""
         self._recording = None
         self._parts.let_go(recording)
         if recording.mishap and recording.ending.failure is None:
-            self._preroll.put_back(recording.take_kept())
+            self._preroll.put_back(recording.in_flight.take_kept())
         self._report(self._parts.finished(recording, self._publisher.dropped))
 
     def _give_up(self, recording: Recording, error: StorageError, *, may_continue: bool) -> None:
@@ -316,7 +316,7 @@ class Recordings:
         recording.ending.failure = error if isinstance(error, StorageError) else None
         recording.ending.early = error.said
         recording.mishap = False
-        recording.forget()
+        recording.in_flight.forget()
         taken = isinstance(error, NameTakenError)  # the service orders the recording again under another name
         event = Event.now(Level.WARNING if taken else Level.FATAL, "recorder", error.said)
         self._publisher.event(recording.dated(event, host_now()))

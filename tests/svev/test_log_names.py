@@ -36,7 +36,7 @@ def test_logs_are_merged(tmp_path: Path) -> None:
         write_part(tmp_path / "part.mcap", [camera], range(40))
         (tmp_path / "part.mcap").rename(path)
     assert main(["merge", str(one), str(two), "-o", str(out)]) == 0
-    assert {status for run in verify(out).ledger.incomplete for _, status in run.cameras} <= {FrameStatus.ABSENT}
+    assert {status for run in verify(out).ledger.failed.runs for _, status in run.cameras} <= {FrameStatus.ABSENT}
     with LogReader(out) as reader:
         list(reader.messages("/events"))
         assert reader.metadata[MERGE_METADATA]["source_1"] == f"{SHOWN}-a.mcap"

@@ -60,15 +60,52 @@ class Spread:
 
 
 @dataclass(slots=True)
+class FailedFrames:
+    """The frames that did not come, or came damaged.
+
+    Attributes:
+        pulses: how many lack a frame.
+        causes: missing frames by status.
+        cameras: the same by name of the camera, without the cameras that delivered all frames.
+        runs: runs of pulses with missing frames, the first ten thousand.
+    """
+
+    pulses: int = 0
+    causes: Counter[FrameStatus] = field(default_factory=Counter)
+    cameras: dict[str, Counter[FrameStatus]] = field(default_factory=dict)
+    runs: list[IncompleteRun] = field(default_factory=list)
+    _count: int = 0
+
+    def add(self, pulse: PulseNumber, failed: tuple[tuple[str, FrameStatus], ...]) -> None:
+        """Count the missing frames of a pulse: name and status of their cameras."""
+        self.pulses += 1
+        for name, status in failed:
+            self.causes[status] += 1
+            self.cameras.setdefault(name, Counter())[status] += 1
+        last = self.runs[-1] if self.runs else None
+        if last is not None and last.last == pulse - 1 and last.cameras == failed and self._count <= _RUNS_KEPT:
+            self.runs[-1] = IncompleteRun(last.first, pulse, last.cameras)
+            return
+        self._count += 1
+        if self._count <= _RUNS_KEPT:
+            self.runs.append(IncompleteRun(pulse, pulse, failed))
+
+    def in_words(self) -> Iterator[str]:
+        """One line per run of pulses with the same fate, e.g. "pulses 61-64: K2 lost"."""
+        for run in self.runs:
+            fates = ", ".join(f"{name} {status.value}" for name, status in run.cameras)
+            yield f"{span(run.first, run.last)}: {fates}"
+        if self._count > _RUNS_KEPT:
+            yield f"and {self._count - _RUNS_KEPT} more runs of pulses with missing frames"
+
+
+@dataclass(slots=True)
 class Ledger:
     """The account of a recording; tags are added in the order of the log. Its memory does not grow with their number.
 
     Attributes:
         pulses: number of tags.
-        partial: how many of them lack a frame.
-        causes: missing frames by status.
-        failures: the same by name of the camera, without the cameras that delivered all frames.
-        incomplete: runs of pulses with missing frames, the first ten thousand.
+        failed: the missing frames.
         missing: runs of pulses without a tag, as (first, last).
         out_of_order: pulses whose tag comes twice or too late.
         first_pulse: number of the first tag.
@@ -78,10 +115,7 @@ class Ledger:
     """
 
     pulses: int = 0
-    partial: int = 0
-    causes: Counter[FrameStatus] = field(default_factory=Counter)
-    failures: dict[str, Counter[FrameStatus]] = field(default_factory=dict)
-    incomplete: list[IncompleteRun] = field(default_factory=list)
+    failed: FailedFrames = field(default_factory=FailedFrames)
     missing: list[tuple[int, int]] = field(default_factory=list)
     out_of_order: list[PulseNumber] = field(default_factory=list)
     first_pulse: PulseNumber = _NONE
@@ -92,7 +126,6 @@ class Ledger:
     _pauses: PauseFinder = field(default_factory=PauseFinder)
     _begin: UtcNs | None = None
     _end: UtcNs | None = None
-    _runs: int = 0
     _follows: PulseNumber = _NONE
 
     def follows(self, last: PulseNumber) -> None:
@@ -119,23 +152,10 @@ class Ledger:
         self.pulses += 1
         failed = tuple((camera.name, camera.status) for camera in tag.cameras if camera.status is not FrameStatus.OK)
         if failed:
-            self._count_failed(tag.pulse, failed)
+            self.failed.add(tag.pulse, failed)
         for camera in tag.cameras:
             if camera.offset_us is not None:
                 self.spread.add(camera.offset_us)
-
-    def _count_failed(self, pulse: PulseNumber, failed: tuple[tuple[str, FrameStatus], ...]) -> None:
-        self.partial += 1
-        for name, status in failed:
-            self.causes[status] += 1
-            self.failures.setdefault(name, Counter())[status] += 1
-        last = self.incomplete[-1] if self.incomplete else None
-        if last is not None and last.last == pulse - 1 and last.cameras == failed and self._runs <= _RUNS_KEPT:
-            self.incomplete[-1] = IncompleteRun(last.first, pulse, last.cameras)
-            return
-        self._runs += 1
-        if self._runs <= _RUNS_KEPT:
-            self.incomplete.append(IncompleteRun(pulse, pulse, failed))
 
     def lasted(self, begin: UtcNs | None, end: UtcNs | None, period_ns: float | None) -> None:
         """Say when the recording began and ended, so that time before the first and after the last pulse counts.
@@ -155,12 +175,12 @@ class Ledger:
     @property
     def complete(self) -> int:
         """Pulses that every camera delivered."""
-        return self.pulses - self.partial
+        return self.pulses - self.failed.pulses
 
     @property
     def whole(self) -> bool:
         """Whether nothing is missing: every pulse has a tag and all its frames, and there is no pause."""
-        return not (self.partial or self.missing or self.out_of_order or self.pauses())
+        return not (self.failed.pulses or self.missing or self.out_of_order or self.pauses())
 
     @property
     def duration_s(self) -> float:
@@ -212,7 +232,7 @@ class Ledger:
         Args:
             names: of the cameras, in the order wanted.
         """
-        failures = {name: self.failures.get(name, Counter[FrameStatus]()) for name in names}
+        failures = {name: self.failed.cameras.get(name, Counter[FrameStatus]()) for name in names}
         return {
             name: {
                 status.value: self.pulses - failed.total() if status is FrameStatus.OK else failed[status]
@@ -224,20 +244,16 @@ class Ledger:
     def counts(self) -> Counts:
         """Pulses, complete, partial and causes, as every command reports them; causes count frames, not pulses."""
         failures = [status for status in FrameStatus if status is not FrameStatus.OK]
-        causes = Causes(**{status.value: self.causes[status] for status in failures})
-        return Counts(pulses=self.pulses, complete=self.complete, partial=self.partial, causes=causes)
+        causes = Causes(**{status.value: self.failed.causes[status] for status in failures})
+        return Counts(pulses=self.pulses, complete=self.complete, partial=self.failed.pulses, causes=causes)
 
     def incomplete_pulses(self, limit: int) -> list[dict[str, Any]]:
         """The pulses with missing frames one by one, as JSON; at most `limit` of them."""
-        return list(islice((pulse for run in self.incomplete for pulse in run.to_json()), limit))
+        return list(islice((pulse for run in self.failed.runs for pulse in run.to_json()), limit))
 
     def in_words(self) -> Iterator[str]:
         """One line per run of pulses with the same fate, e.g. "pulses 61-64: K2 lost", and one per pause."""
-        for run in self.incomplete:
-            fates = ", ".join(f"{name} {status.value}" for name, status in run.cameras)
-            yield f"{span(run.first, run.last)}: {fates}"
-        if self._runs > _RUNS_KEPT:
-            yield f"and {self._runs - _RUNS_KEPT} more runs of pulses with missing frames"
+        yield from self.failed.in_words()
         for first, last in self.missing:
             yield f"{span(first, last)}: no tag, nothing is known of {'it' if first == last else 'them'}"
         for pause in self.pauses():
@@ -245,8 +261,8 @@ class Ledger:
 
     def summary_line(self) -> str:
         """The counts in words."""
-        failed = ", ".join(f"{count} {status.value}" for status, count in sorted(self.causes.items()))
-        line = f"{self.pulses} pulses, {self.complete} complete, {self.partial} partial"
+        failed = ", ".join(f"{count} {status.value}" for status, count in sorted(self.failed.causes.items()))
+        line = f"{self.pulses} pulses, {self.complete} complete, {self.failed.pulses} partial"
         line += f" (frames: {failed})" if failed else ""
         return f"{line}; {words}" if (words := pauses_in_words(self.pauses())) else line
 

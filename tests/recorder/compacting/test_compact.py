@@ -273,7 +273,7 @@ def test_the_command_says_how_much_smaller_and_info_what_it_is(
     assert main(["compact", str(out)]) == 2
     assert main(["compact", str(log), "-o", str(tmp_path / "archive.mcap")]) == 0
     assert "read back from the disk" in capsys.readouterr().out
-    assert FrameStatus.LOST in {status for run in verify(out).ledger.incomplete for _, status in run.cameras}
+    assert FrameStatus.LOST in {status for run in verify(out).ledger.failed.runs for _, status in run.cameras}
 
 
 def test_compacted_parts_are_parts_of_one_another_under_the_names_they_get(tmp_path: Path) -> None:

@@ -278,9 +278,9 @@ def test_pulses_without_any_frame_keep_their_tags(tmp_path: Path, publisher: Pub
         recorder.finish()
     report = verify(path)
     assert (report.verdict, report.ledger.pulses, report.ledger.complete) == ("partial", 25, 24)
-    assert [(run.first, run.last, {status.value for _, status in run.cameras}) for run in report.ledger.incomplete] == [
-        (11, 11, {"lost"})
-    ]
+    assert [
+        (run.first, run.last, {status.value for _, status in run.cameras}) for run in report.ledger.failed.runs
+    ] == [(11, 11, {"lost"})]
 
 
 def test_what_happened_during_the_preroll_stands_in_the_log(tmp_path: Path, publisher: Publisher) -> None:

@@ -65,19 +65,19 @@ def test_pulses_without_any_camera_are_tagged_absent(
     report = verify(path)
     assert ended.pauses == report.ledger.pauses() == ()
     assert (report.verdict, report.ledger.pulses) == ("partial", ended.counts.pulses)
-    away = [run for run in report.ledger.incomplete if len(run.cameras) == len(NAMES)]
+    away = [run for run in report.ledger.failed.runs if len(run.cameras) == len(NAMES)]
     if come_back:
         assert away
         assert away[-1].last + 30 <= report.ledger.pulses
     else:
-        assert report.ledger.causes[FrameStatus.ABSENT] > 3 * 60
-        assert away[-1] == report.ledger.incomplete[-1]
+        assert report.ledger.failed.causes[FrameStatus.ABSENT] > 3 * 60
+        assert away[-1] == report.ledger.failed.runs[-1]
         assert away[-1].last == report.ledger.pulses
     assert report.ledger.rate_hz == pytest.approx(30, abs=0.05)
     fault_table.tell(
         "Cameras and pulses",
         f"all cameras lose their power{', and come back' if come_back else ''}",
-        lost=f"none: {report.ledger.causes[FrameStatus.ABSENT]} frames, absent",
+        lost=f"none: {report.ledger.failed.causes[FrameStatus.ABSENT]} frames, absent",
         said=f"K1 gone: (why), and so on; svev verify: {report.verdict}",
         code="-",
     )

@@ -131,8 +131,8 @@ def test_neighbouring_pulses_with_the_same_fate_are_one_run() -> None:
     ledger = Ledger()
     for pulse in range(1, 101):
         ledger.add(tag_at(pulse, START + pulse * PERIOD, [pulse, None if 20 <= pulse <= 60 else pulse, pulse]))
-    assert [(run.first, run.last) for run in ledger.incomplete] == [(20, 60)]
-    assert (ledger.partial, ledger.complete, ledger.failures["K2"][FrameStatus.LOST]) == (41, 59, 41)
+    assert [(run.first, run.last) for run in ledger.failed.runs] == [(20, 60)]
+    assert (ledger.failed.pulses, ledger.complete, ledger.failed.cameras["K2"][FrameStatus.LOST]) == (41, 59, 41)
     assert [pulse["pulse"] for pulse in ledger.incomplete_pulses(5)] == [20, 21, 22, 23, 24]
     assert list(ledger.in_words()) == ["pulses 20-60: K2 lost"]
 
@@ -155,7 +155,7 @@ def test_memory_does_not_grow_with_the_pulses(every: int) -> None:
     finally:
         tracemalloc.stop()
     assert grown < 40_000, f"{grown} bytes for 40 000 pulses"
-    assert ledger.partial == 80_000 // every
+    assert ledger.failed.pulses == 80_000 // every
 
 
 @pytest.mark.parametrize("known_first", [True, False])

@@ -2,7 +2,7 @@
 
 Aravis writes the packets' payload to the address that it is given, so the recorder can read a frame the moment it is
 whole. Only a few empty buffers stand in Aravis's queue at a time, and free slots are taken lowest first: the same few
-slots are used over and over and stay in the processor's cache.
+slots are used over and over and stay in the processor's cache (`frame_buffers`).
 
 The ids of a buffer whose status is not SUCCESS mean nothing: they may be those of its previous use.
 """
@@ -14,6 +14,7 @@ from capture.aravis.action import lock_clock
 from capture.aravis.clock import CameraClock
 from capture.aravis.configuration import configure, region_limits
 from capture.aravis.features import Features, text_at
+from capture.aravis.frame_buffers import FrameBuffers
 from capture.aravis.gain import gain_steps
 from capture.aravis.library import Aravis, GLib
 from capture.aravis.receive_socket import SOCKET_BUFFER_BYTES, prefers_plain_socket
@@ -36,10 +37,6 @@ _NAMES: Final = ((0x48, 32), (0x68, 32), (0xD8, 16))  # vendor, model, serial nu
 _STREAM_SOURCE_PORT = 0x0D1C  # GigE Vision 2.0, section 28
 _IDS_16_BIT = 65535
 _RETENTION_US = 50_000  # enough to ask for lost packets several times and to receive them
-# How many empty buffers stand in Aravis's queue: half a second of frames, but no more than stay in the cache.
-_QUEUE_S = 0.5
-_QUEUE_BYTES = 24 << 20
-_QUEUE_LEAST = 8
 _BY_CABLE: Final = ExternalTrigger()
 _ALONE: Final = Wire()
 _TEMPERATURES: Final = ("DeviceTemperature", "TemperatureAbs")  # the second: Basler, before the convention
@@ -76,19 +73,12 @@ class AravisCamera:
         set_back: bool = False,
     ) -> None:
         self._name, self._address, self._ring = settings.name, settings.address, ring
-        self._software = trigger if isinstance(trigger, SoftwareTrigger) else None
-        self._action = trigger if isinstance(trigger, ActionTrigger) else None
-        self._keys = None if self._action is None else ActionKeys.of(origin)
         self._commands: CommandTimes | None = None
         self._lost, self._set_back = False, set_back
-        self._plain_socket = prefers_plain_socket(network, settings.frame_bytes, period_ns)
-        self._buffers: dict[int, int] = {}
-        self._of_slot: list[Aravis.Buffer] = []
-        self._in_aravis = 0
+        self._buffers = FrameBuffers(ring, period_ns)
         self._frame_came = False
         self._notices: list[str] = []
-        wanted = min(round(_QUEUE_S * NS_PER_S / period_ns), _QUEUE_BYTES // settings.frame_bytes)
-        self._depth = min(ring.slots, max(_QUEUE_LEAST, wanted))
+        plain_socket = prefers_plain_socket(network, settings.frame_bytes, period_ns)
         sockets = open_sockets()
         try:
             self._camera = Aravis.Camera.new(settings.address)
@@ -101,10 +91,11 @@ class AravisCamera:
             filter_control(sockets, self._camera_host())
             self._device.connect("control-lost", self._on_control_lost)
             self._features = Features(self._device)
-            self._configure(settings, network, NS_PER_S / period_ns)
+            self._configure(settings, NS_PER_S / period_ns, trigger, origin)
+            self._set_packets(network, plain_socket=plain_socket)
             self._frame_ns = self._set_pace(settings, network, period_ns, wire)
-            self._open_clock(settings)
-            self._stream = self._open_stream(network)
+            self._open_clock(settings, trigger)
+            self._stream = self._open_stream(network, plain_socket=plain_socket)
         except GLib.Error as error:
             self.close()
             raise CameraError(
@@ -140,7 +131,7 @@ class AravisCamera:
 
     def start(self) -> None:
         """See `capture.seam.Camera.start`."""
-        self._top_up()
+        self._buffers.top_up(self._stream)
         try:
             self._camera.start_acquisition()
         except GLib.Error as error:
@@ -150,14 +141,13 @@ class AravisCamera:
         """See `capture.seam.Camera.receive`."""
         if self._lost:
             raise CameraError(f"camera {self._name} at {self._address} lost control; check power and cable")
-        self._top_up()
+        self._buffers.top_up(self._stream)
         buffer = self._stream.timeout_pop_buffer(round(timeout_s * 1e6))
         if buffer is None:
             self._check_source()
             return None
         now = host_now()
-        self._in_aravis -= 1
-        slot = self._buffers[hash(buffer)]
+        slot = self._buffers.popped(buffer)
         time = self._time_of(buffer, now)
         if time is None or buffer.get_status() != Aravis.BufferStatus.SUCCESS:
             self._ring.return_slot(slot)
@@ -229,24 +219,25 @@ class AravisCamera:
             self._features.close()  # an error that is still shown refers to them
         for name in ("_source", "_stream", "_clock", "_features", "_device", "_camera"):
             self.__dict__.pop(name, None)
-        self._buffers.clear()
-        self._of_slot.clear()
-        self._ring.reclaim()
+        self._buffers.close()
 
     def _on_control_lost(self, _device: object) -> None:
         self._lost = True
 
-    def _configure(self, settings: CameraSettings, network: NetworkSettings, rate_hz: float) -> None:
+    def _configure(self, settings: CameraSettings, rate_hz: float, trigger: Trigger, origin: HostNs) -> None:
         """Set everything that must be set before the stream is made."""
         # No local names for Aravis objects: the traceback of an error would keep the camera's sockets open.
-        self._notices += configure(
-            self._features, settings, rate_hz, software=self._software is not None, action=self._keys
-        )
-        if self._action is not None and self._action.scheduled:
+        keys = ActionKeys.of(origin) if isinstance(trigger, ActionTrigger) else None
+        software = isinstance(trigger, SoftwareTrigger)
+        self._notices += configure(self._features, settings, rate_hz, software=software, action=keys)
+        if isinstance(trigger, ActionTrigger) and trigger.scheduled:
             lock_clock(self._features, settings.name)
+
+    def _set_packets(self, network: NetworkSettings, *, plain_socket: bool) -> None:
+        """Set how frames come: size of the packets, socket, length of the ids; check how large frames are."""
         if self._features.set_number("GevSCPSPacketSize", network.packet_size, up_to=True) is None:
             self._camera.gv_set_packet_size(network.packet_size)
-        if self._plain_socket:
+        if plain_socket:
             self._camera.gv_set_stream_options(Aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
         self._id_modulus = 0 if self._features.switch("GevGVSPExtendedIDMode", on=True) else _IDS_16_BIT
         payload = self._camera.get_payload()
@@ -264,20 +255,20 @@ class AravisCamera:
         self._notices += [f"camera {settings.name}: {notice}" for notice in pace.notices]
         return pace.frame_ns
 
-    def _open_clock(self, settings: CameraSettings) -> None:
+    def _open_clock(self, settings: CameraSettings, trigger: Trigger) -> None:
         """Find a way to read the camera's clock; one that is told to expose can do without."""
         try:
             self._clock = CameraClock(settings.name, self._device, self._features)
         except CameraError:
-            if self._software is None:
+            if not isinstance(trigger, SoftwareTrigger):
                 raise
-            self._commands = CommandTimes(round(settings.exposure_us * 1000), self._software.longest_ns)
+            self._commands = CommandTimes(round(settings.exposure_us * 1000), trigger.longest_ns)
 
     def _time_of(self, buffer: "Aravis.Buffer", now: HostNs) -> DeviceNs | None:
         """When the camera exposed, by its clock, or by the command that has made the frame; None: it cannot be told."""
         return DeviceNs(buffer.get_timestamp()) if self._commands is None else self._commands.answered(now)
 
-    def _open_stream(self, network: NetworkSettings) -> "Aravis.Stream":
+    def _open_stream(self, network: NetworkSettings, *, plain_socket: bool) -> "Aravis.Stream":
         sockets = open_sockets()
         stream = self._camera.create_stream(None, None)
         if stream is None:
@@ -286,7 +277,7 @@ class AravisCamera:
         resend = Aravis.GvStreamPacketResend.ALWAYS if network.resend else Aravis.GvStreamPacketResend.NEVER
         # A packet socket hands packets over in blocks of up to 5 ms: a shorter timeout asks for packets that have
         # come already. A whole frame waits behind a damaged one for `frame-retention`.
-        packet_timeout_us = 3_000 if self._plain_socket else 8_000
+        packet_timeout_us = 3_000 if plain_socket else 8_000
         for name, value in {
             "packet-resend": resend,
             "packet-timeout": packet_timeout_us,
@@ -297,10 +288,7 @@ class AravisCamera:
             "socket-buffer-size": SOCKET_BUFFER_BYTES,
         }.items():
             stream.set_property(name, value)
-        for slot in range(self._ring.slots):
-            buffer = Aravis.Buffer.new(self._ring.frame_bytes, self._ring.slot_address(slot))
-            self._buffers[hash(buffer)] = slot  # the hash is the address of the C object, which does not change
-            self._of_slot.append(buffer)
+        self._buffers.make()
         return stream
 
     def _filter_source(self, stream: "Aravis.Stream", before: Collection[str]) -> SourceFilter:
@@ -324,15 +312,6 @@ class AravisCamera:
             f"camera {self._name} streams from another port than it says: packets from other ports of "
             f"{self._address} are taken for its own"
         )
-
-    def _top_up(self) -> None:
-        """Fill Aravis's queue of empty buffers, as far as the recorder leaves slots free."""
-        while self._in_aravis < self._depth:
-            slot = self._ring.take_slot()
-            if slot is None:
-                return
-            self._stream.push_buffer(self._of_slot[slot])
-            self._in_aravis += 1
 
     def _read(self, register: int) -> int:
         return int(self._device.read_register(register))

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -266,6 +267,48 @@ class HeadlessRig:
         raise CameraNotFoundError(reasons + without)
 
 
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What became of a recording.
+
+    Attributes:
+        report: of the recorder.
+        alarms: messages of the alarms during it.
+        stopped_early: a person ended it.
+    """
+
+    report: RecordingFinished
+    alarms: tuple[str, ...]
+    stopped_early: bool
+
+    @property
+    def logs(self) -> tuple[Path, ...]:
+        """Its logs, in order."""
+        return (*(part.path for part in self.report.earlier), self.report.path)
+
+    @property
+    def disk_error(self) -> StorageError | None:
+        """Why images are missing because of the disk; None if the disk did its work."""
+        report = self.report
+        if report.failure is not None:
+            error = report.failure.error()
+            return error if isinstance(error, StorageError) else StorageError(str(error))
+        return StorageError(f"{report.path}: {report.trouble}") if report.trouble else None
+
+    def to_json(self) -> dict[str, Any]:
+        """As `svev record --json` prints it."""
+        return {
+            "log": str(self.report.path),
+            **self.report.counts.model_dump(),
+            "pauses": [wire.to_builtins(pause) for pause in self.report.pauses],
+            "alarms": list(self.alarms),
+            "bytes": self.report.bytes,
+            "unpublished": self.report.unpublished,
+            "stopped_early": self.stopped_early,
+            "logs": [str(log) for log in self.logs],
+        }
+
+
 def record(
     running: HeadlessRig,
     rig: RigSettings,
@@ -275,7 +318,7 @@ def record(
     session: Mapping[str, str],
     progress: Progress,
     asks: Asks,
-) -> tuple[dict[str, Any], StorageError | None]:
+) -> Recorded:
     """Record once: wait until the rig is warm, record, wait for the end.
 
     Args:
@@ -287,10 +330,6 @@ def record(
         progress: shows how many pulses are recorded.
         asks: tells how often a person has asked to end; the recording ends early then, and is closed properly.
 
-    Returns:
-        The result as `svev record --json` prints it, and why images are missing because of the disk; None if the disk
-        did its work.
-
     Raises:
         KeyboardInterrupt: a person asked to end before the recording began.
         SvevError: the disk has no room, a camera does not answer, the log cannot be made, the recorder died.
@@ -301,24 +340,4 @@ def record(
     with progress(f"recording {path.name}", pulses) as advance:
         running.start_recording(path, session=session, pulses=pulses, seconds=seconds)
         report = running.wait_until_finished(lambda counts: advance(counts.pulses), asks)
-        early = asks() > 0
-    logs = [*(part.path for part in report.earlier), report.path]
-    result = {
-        "log": str(report.path),
-        **report.counts.model_dump(),
-        "pauses": [wire.to_builtins(pause) for pause in report.pauses],
-        "alarms": running.alarms,
-        "bytes": report.bytes,
-        "unpublished": report.unpublished,
-        "stopped_early": early,
-        "logs": [str(log) for log in logs],
-    }
-    return result, _disk_error(report)
-
-
-def _disk_error(report: RecordingFinished) -> StorageError | None:
-    """What the disk cost the recording, as an error; None if nothing."""
-    if report.failure is not None:
-        error = report.failure.error()
-        return error if isinstance(error, StorageError) else StorageError(str(error))
-    return StorageError(f"{report.path}: {report.trouble}") if report.trouble else None
+        return Recorded(report, tuple(running.alarms), stopped_early=asks() > 0)

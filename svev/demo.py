@@ -65,18 +65,16 @@ def run_demo(
         running.wait_until_warm(asks)
         with subscriber(rig.network.publish) as count_received:
             session = {"session": "demo", "athlete": "simulated jumper"}
-            result, disk_error = record(
-                running, rig, path, seconds, session=session, progress=console.progress, asks=asks
-            )
+            recorded = record(running, rig, path, seconds, session=session, progress=console.progress, asks=asks)
             counted = count_received()
-    if disk_error is not None:
-        raise disk_error
-    path = Path(result["log"])
+    if recorded.disk_error is not None:
+        raise recorded.disk_error
+    path = recorded.report.path
     say("checking the log")
     report = verify(path)
     sheet = path.with_suffix(".png")
     write_contact_sheet(path, sheet)
-    return result | {
+    return recorded.to_json() | {
         "rate_hz": rig.trigger.rate_hz,
         "subscriber": {name: getattr(counted, name) for name in ("received", "missing", "bytes", "latency_ms")},
         "verdict": report.verdict,

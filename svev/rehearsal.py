@@ -7,7 +7,7 @@ work together as in a recording, and then asks the log itself what came of it.
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from ipaddress import IPv4Address
 from pathlib import Path
@@ -125,21 +125,21 @@ def rehearse(
     with tempfile.TemporaryDirectory(prefix=f"{_FOLDER}{os.getpid()}-", dir=directory) as folder:
         log = Path(folder) / name
         with HeadlessRig(rig, rig_toml, say) as running:
-            result, disk_error = record(
+            recorded = record(
                 running, rig, log, seconds, session={"session": "rehearsal"}, progress=progress, asks=asks
             )
-        if disk_error is not None:
-            raise disk_error
-        if result["stopped_early"]:
+        if recorded.disk_error is not None:
+            raise recorded.disk_error
+        if recorded.stopped_early:
             raise KeyboardInterrupt  # what was recorded until then bears no verdict
         report, timing = verify(log, lambda _: heed(asks)), _Timing.of(log)
-    findings += judge_pulses(rig, result["alarms"], report)
+    findings += judge_pulses(rig, recorded.alarms, report)
     findings += judge_source(rig)
     findings += _judge_timing(rig, timing)
     return Rehearsed(
         pulses=report.ledger.pulses,
         complete=report.ledger.complete,
-        causes=result["causes"],
+        causes=recorded.report.counts.causes.model_dump(),
         headroom={name: round(times, 2) for name, times in headroom_of(rig, findings)},
         jumps=room_for(rig, free_bytes(directory) or 0).jumps,
         spread_us=timing.spread_us,
@@ -198,7 +198,7 @@ def _tags(log: Path) -> Iterator[TripletTag]:
                 yield from (tag for message in item.messages if (tag := tag_of(message)) is not None)
 
 
-def judge_pulses(rig: RigSettings, alarms: list[str], report: VerifyReport) -> Iterator[Finding]:
+def judge_pulses(rig: RigSettings, alarms: Sequence[str], report: VerifyReport) -> Iterator[Finding]:
     """Did every frame come, is the log on the disk what was written, does its ledger bear the tags out?
 
     Args:

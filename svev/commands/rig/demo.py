@@ -48,7 +48,7 @@ def demo(
     counted, latency = result["subscriber"], result["subscriber"]["latency_ms"]
     console.say("")
     console.say(f"pulses             {result['pulses']} at {result['rate_hz']:g} Hz")
-    console.say(f"complete triplets  {result['complete']}{causes(result)}")
+    console.say(f"complete triplets  {result['complete']}{causes(result['causes'])}")
     console.say(f"subscriber got     {counted['received']}, missing {counted['missing']}")
     if latency["median"] is not None:
         console.say(f"latency            {latency['median']:.1f} ms median, {latency['p99']:.1f} ms at 99 %")

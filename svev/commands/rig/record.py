@@ -1,9 +1,9 @@
 """`svev record`: one recording with the cameras of a rig file."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import msgspec
 import typer
 from pydantic import TypeAdapter, ValidationError
 
@@ -11,9 +11,8 @@ from recorder.publishing.keys import check_publication
 from rig.api.fields import LONGEST_LINE, Line
 from rig.errors import BadInputError, PairingAlarmError, PulsesPausedError
 from rig.host.endings import counted_endings
-from rig.pulse import Pause
 from rig.settings.file import load_rig
-from service.headless import HeadlessRig
+from service.headless import HeadlessRig, Recorded
 from service.headless import record as record_with
 from service.recordings.storage import new_log_path
 from svev import console
@@ -70,28 +69,34 @@ def record(
         HeadlessRig(settings, rig.read_text(encoding="utf-8"), aside) as running,
     ):
         path = new_log_path(out)
-        result, disk_error = record_with(
+        recorded = record_with(
             running, settings, path, seconds, session={"session": session},
             progress=console.progress, asks=asks,
         )  # fmt: skip
     if as_json:
-        console.print_json(result)
+        console.print_json(recorded.to_json())
     else:
-        console.say(f"{result['pulses']} pulses, {result['complete']} complete{causes(result)}")
-        if earlier := result["logs"][:-1]:
-            console.say(f"{len(earlier)} parts before the last one, the first in {earlier[0]}")
-        console.say(f"{result['bytes'] / 1e6:.1f} MB in {result['log']}")
-        console.say(f"check it: svev verify {result['log']}")
-    if disk_error is not None:
-        raise disk_error
-    if result["pauses"]:
-        first, more = msgspec.convert(result["pauses"][0], Pause).in_words(), len(result["pauses"]) - 1
+        _say(recorded)
+    if recorded.disk_error is not None:
+        raise recorded.disk_error
+    log, pauses = recorded.report.path, recorded.report.pauses
+    if pauses:
+        first, more = pauses[0].in_words(), len(pauses) - 1
         raise PulsesPausedError(
-            f"{result['log']}: {first}{f', and {more} more pauses' if more else ''}; look at the trigger, or at what "
-            "the log says of the cameras at that time: svev verify"
+            f"{log}: {first}{f', and {more} more pauses' if more else ''}; look at the trigger, or at what the log "
+            "says of the cameras at that time: svev verify"
         )
-    if result["alarms"]:
-        raise PairingAlarmError(f"{result['log']}: {'; '.join(result['alarms'])}")
+    if recorded.alarms:
+        raise PairingAlarmError(f"{log}: {'; '.join(recorded.alarms)}")
+
+
+def _say(recorded: Recorded) -> None:
+    report, counts = recorded.report, recorded.report.counts
+    console.say(f"{counts.pulses} pulses, {counts.complete} complete{causes(counts.causes.model_dump())}")
+    if earlier := recorded.logs[:-1]:
+        console.say(f"{len(earlier)} parts before the last one, the first in {earlier[0]}")
+    console.say(f"{report.bytes / 1e6:.1f} MB in {report.path}")
+    console.say(f"check it: svev verify {report.path}")
 
 
 def _check_session(session: str) -> None:
@@ -114,7 +119,7 @@ def aside(line: str) -> None:
     console.say(line, aside=True)
 
 
-def causes(result: dict[str, Any]) -> str:
+def causes(missing: Mapping[str, int]) -> str:
     """What became of the frames that are missing, in brackets; nothing if none is missing."""
-    missing = ", ".join(f"{count} {cause}" for cause, count in result["causes"].items() if count)
-    return f" (frames: {missing})" if missing else ""
+    words = ", ".join(f"{count} {cause}" for cause, count in missing.items() if count)
+    return f" (frames: {words})" if words else ""

@@ -6,6 +6,7 @@ A store that accepts connections and never answers is given up after a minute.
 import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any, Final
 
 from rig.errors import SvevError
@@ -17,8 +18,8 @@ _LONGEST: Final = 500
 #: the store before it answers.
 _CONNECT_S: Final = 5
 _ANSWER_S: Final = 15
-#: Tries of botocore, which tries again after errors of the server, and around them tries of s3fs, which does so after
-#: a body that broke off. Their own numbers are 5 and 5: more than six minutes of silence.
+#: Tries of botocore after errors of the server, and around them tries of s3fs after a body that broke off. Their own
+#: numbers are 5 and 5: more than six minutes of silence.
 _TRIES: Final = 2
 _S3: Final = frozenset({"s3", "s3a"})
 
@@ -84,12 +85,11 @@ def _socket(address: tuple[Any, ...]) -> socket.socket:
 
 
 def _bound(store: Any) -> None:
-    """Bound what s3fs and botocore offer no option for."""
-    from botocore.handlers import add_expect_header  # noqa: PLC0415 - as s3fs, which has just been imported
-
+    """Bound what s3fs and botocore offer no option for; both are installed by those who use such a store."""
+    handlers = import_module("botocore.handlers")
     store.retries = _TRIES
     # With `Expect: 100-continue` what is written is held back until the store asks for it: for ever, if it does not.
-    store.connect().meta.events.unregister("before-call.s3", add_expect_header)
+    store.connect().meta.events.unregister("before-call.s3", handlers.add_expect_header)
 
 
 def _is_silence(error: Exception) -> bool:

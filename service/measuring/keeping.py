@@ -43,7 +43,7 @@ def keep_result(made: Path, log: Path, jumps: tuple[LastJump, ...], names: Mappi
 
 
 def keep_own_result(log: Path, jumps: tuple[LastJump, ...], names: Mapping[str, str]) -> None:
-    """Note what stands in a result that a person has written beside a log, so that it is like those of the service.
+    """Note the summary of a result that `svev analyze` has written beside a log, as for results of the service.
 
     Args:
         log: the log.

@@ -16,7 +16,7 @@ from analysis.report.kinogram.earlier import read_earlier
 from analysis.result import file as result_file
 from analysis.worker.findings import summary
 from photogrammetry.network.diagnosis import NotConvergedError, NotSolvableError
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from rig.errors import StorageError
 from rig.host.endings import interrupted_by_endings
 from service.measuring.keeping import keep_own_result

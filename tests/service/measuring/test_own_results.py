@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from recorder.catalogue.folder import Catalogue
-from recorder.log.measured_path import measured_path
+from recorder.log.beside import measured_path
 from rig.api.athletes import JumpQuery
 from rig.api.measuring import MeasuringState
 from rig.api.recordings import RecordingQuery

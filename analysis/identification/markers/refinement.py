@@ -25,7 +25,9 @@ from analysis.measurements.model import POINTS
 from rig.arrays import Flags, Floats, Integers
 
 _SPREAD = 0.04  #: standard deviation of the logarithm of a marker's radius: they are made alike, cloth bends them
-_FEW = 6  #: spots of a marker that tell its size; likewise of a camera, below which those of all cameras do
+#: Spots of a marker that tell its size; likewise of a camera, below which those of all cameras do; discs that markers
+#: have among so many spots as tell whether they are markers, where few spots of any are discs.
+_FEW = 6
 _LIT = 0.75  #: of the light of a whole marker, what three quarters of one have
 _SMALLEST_PX = 0.5  #: a smaller radius cannot be told from the blur
 _NEAR = 1.5  #: radii from a predicted place to a spot that may be the marker's
@@ -130,14 +132,15 @@ class _Seen:
     def worn(self) -> Flags:
         """Which markers (4,) are markers.
 
-        In some pictures hardly any marker is a disc that can be fitted; then nothing is told. Legs cover bindings, so
-        these are compared with each other.
+        In some pictures hardly any marker is a disc that can be fitted; then many spots tell of one, few nothing. Legs
+        cover bindings, so these are compared with each other.
         """
         share = self._discs / np.maximum(self._spots, 1.0)
         enough = self._spots >= _FEW
         usual = np.full(len(POINTS), np.median(share[enough]) if enough.any() else 0.0)
         usual[BINDINGS] = np.where(enough[BINDINGS[::-1]], share[BINDINGS[::-1]], usual[BINDINGS])
-        return np.asarray(~enough | (share >= _MOST * usual) | (usual < _MOST))
+        tells = (usual >= _MOST) | (usual * self._spots >= _FEW)
+        return np.asarray(~enough | (share >= _MOST * usual) | ~tells)
 
 
 def _fitted(views: Views, window: Window, k: int, places: _Places, shape: DiscShape, look: SecondLook) -> Spots:

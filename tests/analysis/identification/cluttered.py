@@ -128,9 +128,11 @@ class SimulatedLook:
 
     Attributes:
         light: contrast of the disc of each marker; one whose spots have another contrast is none.
+        every: discs are found in one of so many pulses.
     """
 
     light: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(POINTS, 80.0))
+    every: int = 1
 
     def look_for_spots(self, pulses: Sequence[PulseNumber], camera: str, xy: Floats, covariance: Floats) -> list[Spots]:
         """See `SecondLook`."""
@@ -159,7 +161,7 @@ class SimulatedLook:
             nearest = int(np.linalg.norm(places - xy[i], axis=1).argmin())
             light = self.light[POINTS[nearest]]
             like = abs(light - shape.contrast) < 2 * shape.sigma_contrast
-            if like and np.linalg.norm(places[nearest] - xy[i]) < shape.radius[i]:
+            if like and pulse % self.every == 0 and np.linalg.norm(places[nearest] - xy[i]) < shape.radius[i]:
                 discs.xy[i], discs.covariance[i] = places[nearest], SIGMA_PX**2 * np.eye(2)
                 discs.contrast[i], discs.strength[i] = light, 20.0
         return discs

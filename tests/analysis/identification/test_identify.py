@@ -168,6 +168,15 @@ def test_what_is_no_disc_like_the_markers_is_none_and_a_marker_in_the_shade_is_o
         made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), PULSES, dim)
 
 
+def test_what_is_never_a_disc_is_none_also_where_few_markers_are() -> None:
+    """Small markers, half covered ones and poor light: one spot of three is a disc."""
+    lights = dict.fromkeys(POINTS, 80.0) | {"P1": 1e9}
+    made = scene([true_jump(7)], true_cameras(), np.random.default_rng(1), PULSES, Disturbed(light={"P1": 0.5}))
+    (jump,) = identify(made.candidates, true_cameras(), RATE_HZ, None, SimulatedLook(lights, every=3))
+    found = {label for pulse in jump.pulses for image in pulse.images.values() for label in image.points}
+    assert found == {"P2", "P3", "P4"}
+
+
 @pytest.mark.long
 def test_a_second_look_adds_what_was_missed() -> None:
     made = scene([true_jump(7)], true_cameras(), np.random.default_rng(7), PULSES, Disturbed(5, lost=0.3))

@@ -88,6 +88,7 @@ def judge(
     # Without a take-off nobody knows which pulses are in flight: all are judged together.
     flight = everything if takeoff is None else phases[Phase.FLIGHT]
     where = NOTHING if takeoff is None else phrase("jump_in_flight", " in flight")
+    found += _never_found(seen, found)
     found += _too_few(flight, "points", phrase("jump_all_points", "all points"), where)
     found += _too_few(flight, "skis", phrase("jump_both_skis", "both skis"), where)
     if everything["points_controlled"] < _CONTROLLED * len(seen):
@@ -210,6 +211,17 @@ def _contradicting(
             )
             lines.append(phrase("jump_contradicting", text, camera=name, there=there, used=used[name]))
     return lines
+
+
+def _never_found(seen: Sequence[PulseState], said: Sequence[Phrase]) -> list[Phrase]:
+    """A sentence on points that no pulse shows, while it shows others, and of which nothing is said yet."""
+    spoken = " ".join(map(str, said))
+    never = [name for name in POINTS if all(pulse.raw.points[name] is None for pulse in seen)]
+    unspoken = [name for name in never if name not in spoken]
+    if not unspoken or len(never) == len(POINTS):
+        return []
+    text = "no pulse shows {points}: its marker is not worn, always covered, or hardly differs from what is around it"
+    return [phrase("jump_never_found", text, points=", ".join(unspoken))]
 
 
 def _places(pulse: PulseState) -> Floats:

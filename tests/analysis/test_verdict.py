@@ -78,6 +78,8 @@ def test_what_nothing_names_is_not_given(names: dict[str, str], skis: tuple[str,
         assert jump.verdict.message.startswith(f"{' and '.join(lost)} is not given: ")
     else:
         assert "not given" not in jump.verdict.message
+    never = sorted(set(POINTS) - set(names.values()))
+    assert (f"no pulse shows {', '.join(never)}: " in jump.verdict.message) is bool(told and never)
     assert jump.verdict.ok is (names == _RIGHT and len(skis) == len(SIDES))
 
 

@@ -30,6 +30,7 @@ export const analysis = {
   jump_untold: ["hvilken markør som er hvilken, kan ikke avgjøres, så ingen oppgis: hjelm og hofte ses nesten aldri sammen, heller ikke alle fire, og ingen binding på skien sin; se på overlegget, og gi markørene mer kontrast"],
   jump_untold_point: ["{points} oppgis ikke: det som ble målt der, kan være noe annet på hopperen; se på overlegget, og gi markørene mer kontrast"],
   jump_untold_points: ["{points} oppgis ikke: det som ble målt der, kan være noe annet på hopperen; se på overlegget, og gi markørene mer kontrast"],
+  jump_never_found: ["ingen puls viser {points}: markøren er ikke på, er alltid dekket, eller skiller seg knapt fra det rundt den"],
   jump_too_short: ["færre enn {least} pulser har et punkt i to kameraer: ingenting å glatte"],
   jump_contradictory: ["målingene motsier hverandre: sjekk kalibreringen og kameranavnene"],
   why_no_jump_in_part: ["{log}: ingen hopper i det, men {part}"],

@@ -16,6 +16,7 @@ from analysis.scene.detection import Detections
 from analysis.scene.lit_fit import CommonLight, LitBalls, fit_lit_balls
 from analysis.scene.lit_windows import sighted
 from analysis.scene.static_image import StaticImage
+from photogrammetry.adjustment.solution.adjustment import adjust_once
 from photogrammetry.network.file import pixel_to_metric
 from photogrammetry.network.file_writer import metric_to_pixel
 from photogrammetry.network.model import Network
@@ -28,7 +29,8 @@ _EXPLAINED = 0.7  # of the variance around the background
 _WORST_SIGMA = 0.25  # px
 _FARTHEST = 0.75  # radii between disc and sphere: half a disc is not so far from the centre
 _DISC_SIGMA = 0.25  # radii: how far a disc is off that no sphere explains
-_SCATTER_KNOWN = 10.0  # coordinates that a camera's sigmas from its pixels count for beside its residuals
+_SCATTER_ROUNDS = 8
+_SCATTER_SETTLED = 0.97  # of the a-priori sigma0: nearer makes no sigma better
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,7 +176,7 @@ def with_lit_balls(
 
 
 def with_scatter(network: Network, orientation: Orientation) -> Network:
-    """The network with sigmas of image points, camera by camera, as large as the balls scatter about one pose.
+    """The network with sigmas of image points so small that the estimated sigma0 is the a-priori one.
 
     What the light does otherwise than the model shows in the pixels of every ball, and is partly alike in all of an
     image: the poses take that, and sigmas from pixels are too large for what is left. The sigmas of the survey, which
@@ -184,18 +186,19 @@ def with_scatter(network: Network, orientation: Orientation) -> Network:
         network: the measured network.
         orientation: of this network.
     """
-    a = orientation.outcome.adjustment
-    squares = (a.image_residuals() / a.problem.sigma) ** 2
-    numbers = a.controlled.image_numbers
-    cameras = [a.network.cameras[image.camera].name for image in a.network.images]
-    of_image = np.array(cameras)[a.network.observations.image]
+    a, factor = orientation.outcome.adjustment, 1.0
+    for _ in range(_SCATTER_ROUNDS):
+        if a.ratio > _SCATTER_SETTLED:  # larger sigmas would hide what is wrong with a camera
+            break
+        factor *= a.ratio
+        a = adjust_once(_scaled(a.network, a.ratio), a.state)
+    return _scaled(network, factor)
+
+
+def _scaled(network: Network, factor: float) -> Network:
+    """The network with the sigmas of image points multiplied by a factor."""
     o = network.observations
-    sigma = o.sigma.copy()
-    for i, image in enumerate(network.images):
-        of = of_image == network.cameras[image.camera].name
-        variance = (_SCATTER_KNOWN + squares[of].sum()) / (_SCATTER_KNOWN + numbers[of].sum())
-        sigma[o.image == i] *= min(1.0, float(np.sqrt(variance)))  # larger ones would hide what is wrong with a camera
-    return replace(network, observations=replace(o, sigma=sigma))
+    return replace(network, observations=replace(o, sigma=o.sigma * factor))
 
 
 def _start_radius(apparent: Floats, camera: Integers, bright: Flags) -> float:

@@ -1,13 +1,18 @@
 """Balls that a sun lights from one side: measured at their centre, with sigmas that hold, and said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from analysis.scene.detection import detect_balls
 from analysis.scene.disc import cover
+from analysis.scene.lit_balls import with_scatter
 from analysis.scene.lit_sphere import Light as Lit
 from analysis.scene.lit_sphere import Spheres, disc_points, sphere_images
 from analysis.scene.orientation import Scene, orient_images
+from bench.photogrammetry.hills import hill
+from photogrammetry.procedures.orientation import orient
 from rig.arrays import Floats
 from simrig.world.conditions.effects import Light, Sun
 from simrig.world.scenario import Scenario
@@ -106,6 +111,16 @@ def test_balls_that_snow_covers_in_part_are_not_believed() -> None:
         for camera, seen in scene.balls[name].images.items():
             assert (np.abs(seen[:2] - balls_in(scenario, camera)[name]) < 4 * seen[2:]).all(), (name, camera)
     assert (np.abs(normalized_error(scene, scenario)) < 4).all()
+
+
+def test_sigmas_of_pixels_that_are_too_large_shrink_none_of_the_survey() -> None:
+    """Three times too large: sigma0 and the sigmas of poses, which share the errors of the survey, became too small."""
+    network = hill(np.random.default_rng(5), helmets=False).network
+    true = network.observations.sigma
+    large = replace(network, observations=replace(network.observations, sigma=3 * true))
+    found = with_scatter(large, orient(large))
+    np.testing.assert_allclose(found.observations.sigma, true, rtol=0.3)
+    assert orient(found).outcome.adjustment.ratio == pytest.approx(1.0, abs=0.06)
 
 
 def test_evenly_bright_balls_keep_their_places_and_sigmas() -> None:

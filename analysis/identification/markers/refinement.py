@@ -132,14 +132,17 @@ class _Seen:
     def worn(self) -> Flags:
         """Which markers (4,) are markers.
 
-        In some pictures hardly any marker is a disc that can be fitted; then many spots tell of one, few nothing. Legs
-        cover bindings, so these are compared with each other.
+        In some pictures hardly any marker is a disc that can be fitted; then many spots tell of helmet and hip, few
+        nothing. Legs cover bindings, one more than the other, so these are compared with each other, and nothing is
+        told of them in such pictures.
         """
         share = self._discs / np.maximum(self._spots, 1.0)
         enough = self._spots >= _FEW
         usual = np.full(len(POINTS), np.median(share[enough]) if enough.any() else 0.0)
         usual[BINDINGS] = np.where(enough[BINDINGS[::-1]], share[BINDINGS[::-1]], usual[BINDINGS])
-        tells = (usual >= _MOST) | (usual * self._spots >= _FEW)
+        many = usual * self._spots >= _FEW
+        many[BINDINGS] = False
+        tells = (usual >= _MOST) | many
         return np.asarray(~enough | (share >= _MOST * usual) | ~tells)
 
 

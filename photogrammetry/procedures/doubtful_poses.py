@@ -188,9 +188,9 @@ def refuse_exchanged_cameras(network: Network, ratio: float) -> None:
     Raises:
         RefusedError: names the two images.
     """
-    alone = without_survey(network)
-    if ratio <= BENT or len(alone.images) > _IMAGES:
+    if ratio <= BENT or len(network.images) > _IMAGES:
         return
+    alone = without_survey(network)
     enough = min(ratio, BENT * BENT) if np.isinf(ratio) else ratio  # beside no block at all any other one looks good
     trials = [(trial, pair) for pair, other in _exchanges(alone) if (trial := _ratio(other)) * BENT < enough]
     if not trials:

@@ -118,7 +118,7 @@ def _in_stages(network: Network) -> tuple[Outcome, tuple[Stage, ...]]:
     search = search_block(network)
     outcome, stage = constrained_stage(search)
     stages = (*search.stages, stage)
-    if _taken_out(outcome):
+    if search.stages and _taken_out(outcome):  # without them the survey alone has led here
         try:
             other, stage = constrained_stage(by_survey_alone(network))
         except (BadInputError, NotSolvableError, NotConvergedError, RefusedError):

@@ -233,7 +233,9 @@ class Recording:
 
     def tag(self, pulse: ClosedPulse) -> TripletTag:
         """The tag of the next pulse of the recording, with its number in it."""
-        return self._tagger.tag(pulse, self.account.first_number(pulse.time, self._order.goes_on))
+        if self._tagger.begun is None:
+            self._tagger.begin(pulse.time, self.account.first_number(pulse.time, self._order.goes_on))
+        return self._tagger.tag(pulse)
 
     def write(self, tag: TripletTag, held: Held, slot: int | None, encoded: bytes) -> None:
         """Hand one pulse to the log. The recording keeps it too, until it is known to be in the file.

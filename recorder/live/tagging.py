@@ -37,10 +37,12 @@ class Tagger:
         ]
         self._next = PulseNumber(0)
 
-    def tag(self, pulse: ClosedPulse, first: PulseNumber) -> TripletTag:
-        """The tag of the next pulse, with its number in it; its number is `first` if it is the log's first one."""
-        if self.begun is None:
-            self._next, self.begun = first, pulse.time
+    def begin(self, time: HostNs, first: PulseNumber) -> None:
+        """Fix time and number of the log's first pulse."""
+        self.begun, self._next = time, first
+
+    def tag(self, pulse: ClosedPulse) -> TripletTag:
+        """The tag of the next pulse, with its number in it."""
         number, self._next = self._next, PulseNumber(self._next + 1)
         time, rig = self.anchor.utc(pulse.time), self._rig
         cameras = tuple(self.camera_tags(pulse))

@@ -93,6 +93,17 @@ def _rig(folder: Path, loopback: Loopback, offload: str) -> Path:
     return rig
 
 
+def _record_again(folder: Path) -> None:
+    """The recordings in the trash lie in the folder as if they had just been recorded, and nothing of them is copied.
+
+    One that was fetched from the trash would not be released for a day.
+    """
+    for path in (folder / ".trash").glob("*"):
+        path.rename(folder / path.name)
+        os.utime(folder / path.name)
+    (folder / ".svev-offload.json").unlink()
+
+
 def _whole(folder: Path, logs: dict[str, bytes]) -> None:
     """Each log is once in the folder or in its trash, as it was."""
     found = [path for place in (folder, folder / ".trash") for path in place.glob("*.mcap")]
@@ -151,9 +162,7 @@ def test_fifty_cuts_lose_nothing_and_copy_nothing_twice(tmp_path: Path, loopback
                 for path in there.glob("large-*"):
                     path.unlink()
                     known.pop(path.name, None)
-                for path in (tmp_path / "data" / ".trash").glob("*"):
-                    path.rename(tmp_path / "data" / path.name)
-                (tmp_path / "data" / ".svev-offload.json").unlink()
+                _record_again(tmp_path / "data")
             with _cut_service(tmp_path, rig, loopback, dict(disk.environment)) as service:
                 with suppress(AssertionError):  # there may be nothing left to do
                     wait_until(lambda: _uploader(service) is not None, "it copies", 5)
@@ -209,9 +218,7 @@ def test_fifty_cuts_of_a_store_lose_nothing_and_copy_nothing_twice(tmp_path: Pat
             nonlocal round_number
             take(address, f"hill/{round_number}", str(tmp_path / f"taken-{round_number}"))
             _check_copies(tmp_path / f"taken-{round_number}", logs)
-            for path in (data / ".trash").glob("*"):
-                path.rename(data / path.name)
-            (data / ".svev-offload.json").unlink()
+            _record_again(data)
             round_number += 1
 
         while cuts < _CUTS:

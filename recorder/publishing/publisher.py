@@ -177,8 +177,14 @@ class Publisher:
         Args:
             linger_s: wait so long for slow subscribers; they miss what they have not received by then.
         """
+        if self._socket.closed:
+            return
         self._peers.close()
-        self._context.destroy(linger=round(linger_s * 1000))
+        self._socket.close(round(linger_s * 1000))
+        # libzmq 4.3.5 waits forever, and keeps slots, if a subscriber that stood still leaves at this very moment.
+        ends = threading.Thread(target=self._context.term, name="publication ends", daemon=True)
+        ends.start()
+        ends.join(linger_s + _PATIENCE_S)
 
     def _wanted(self, topic: bytes) -> bool:
         """Whether anybody has subscribed to `topic`."""

@@ -2,6 +2,8 @@
 
 import json
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -134,8 +136,16 @@ def test_a_subscriber_that_stands_still_blocks_nobody(loopback: Loopback, buffer
                 assert _next_pulse(good) == pulse
             assert publisher.dropped == 0
             assert buffers.free_count >= 16 - 12
-        publisher.close()
+            publisher.close()
         wait_until(lambda: buffers.free_count == 16, "all slots are free")
+
+
+@pytest.mark.long
+def test_closing_ends_although_a_subscriber_that_stands_still_leaves_at_that_moment(loopback: Loopback) -> None:
+    """In a program of its own: of one in some 300 ends, threads of ZeroMQ may remain."""
+    module = "tests.recorder.publishing.leaving_subscriber"
+    done = subprocess.run([sys.executable, "-m", module, loopback.endpoint(), "300"], timeout=120, check=False)
+    assert done.returncode == 0
 
 
 def _arrives(publisher: Publisher, buffers: TripletBuffers, sub: "zmq.Socket[bytes]") -> bool:
@@ -160,7 +170,7 @@ def test_when_too_many_slots_are_out_triplets_are_dropped_and_counted(loopback: 
                 assert buffers.free_count >= 4
             assert publisher.dropped > 0
             assert publisher.sent + publisher.dropped == 199
-        publisher.close()
+            publisher.close()
         wait_until(lambda: buffers.free_count == 6, "all slots are free")
 
 

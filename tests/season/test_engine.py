@@ -54,7 +54,8 @@ def test_a_task_that_kills_two_workers_is_set_aside_and_no_other_is_accused(tmp_
         "deadly-1": "killed: 0.93 GiB", "deadly-2": "killed: 0.93 GiB", "wrong": "failed: wrong",
     }  # fmt: skip
     assert {runs(tmp_path / name) for name in names if name.startswith("deadly")} == {2}
-    assert all(runs(tmp_path / name) <= 3 for name in names)  # beside one that killed its worker: again, alone
+    deaths = 4  # of workers; what ran there, or had ended and was not fetched yet, is run again
+    assert {name: count for name in names if (count := runs(tmp_path / name)) > 1 + deaths} == {}
 
 
 def test_while_no_task_ends_somebody_hears_that_they_run(tmp_path: Path) -> None:

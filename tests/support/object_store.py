@@ -2,6 +2,7 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from tests.support.loopback import Loopback
+from tests.support.waiting import wait_until
 
 #: In a process of its own, as a workplace would use it: the libraries keep threads and connections.
 _PROGRAM: Final = """
@@ -38,13 +40,19 @@ def object_store(loopback: Loopback) -> Iterator[str]:
     """An S3 server; gives its address."""
     port = loopback.free_port()
     command = [sys.executable, "-m", "moto.server", "-H", loopback.host, "-p", str(port)]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+    # It tells each request: a pipe that nobody reads would stop it after some hundreds.
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         try:
-            assert process.stderr is not None
-            next(line for line in process.stderr if "Running on" in line)
+            wait_until(lambda: process.poll() is not None or _listens(loopback.host, port), "the store answers")
+            assert process.poll() is None, "the store has ended"
             yield f"http://{loopback.host}:{port}"
         finally:
             process.kill()
+
+
+def _listens(host: str, port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex((host, port)) == 0
 
 
 def put(address: str, place: str, *paths: str) -> None:

@@ -13,13 +13,15 @@ def main(address: str, times: int) -> None:
     """Fill the queue of a subscriber that reads nothing, let it leave, and close."""
     for _ in range(times):
         buffers = TripletBuffers(SHAPE, 16)
-        with closing(Publisher(address, queue=4)) as publisher:
-            with subscriber(publisher.address, b"triplet", queue=1):
-                assert publisher.wait_for_subscriber(5)
-                for _ in range(14):
-                    slot = acquire(buffers)
-                    publisher.triplet(b"{}", buffers, slot)
-                    buffers.release(slot)
+        with (
+            closing(Publisher(address, queue=4)) as publisher,
+            subscriber(publisher.address, b"triplet", queue=1),
+        ):
+            assert publisher.wait_for_subscriber(5)
+            for _ in range(14):
+                slot = acquire(buffers)
+                publisher.triplet(b"{}", buffers, slot)
+                buffers.release(slot)
 
 
 if __name__ == "__main__":

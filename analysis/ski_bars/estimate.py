@@ -90,8 +90,9 @@ class BarFit:
         at, x = self.model.unknowns, self.mean.copy()
         x[POSE] = shift
         seen = self.model.predicted(self.pixels, x, derivatives=False)
+        bare = ~self.hidden(x)
         for c in range(len(self.model.views)):
-            here = self.pixels.camera == c
+            here = bare & (self.pixels.camera == c)
             for k in range(SKIS):
                 core = here & (np.abs(seen.u[k]) < _ON_AXIS_PX) & (seen.cover[k] > 0.5)
                 if core.any():

@@ -5,8 +5,10 @@ time at which its spots lie on the path that the others saw. This is a start for
 is measured by the bundle over time.
 """
 
+from typing import Final
+
 import numpy as np
-from scipy.special import bdtrc, pdtrc
+from scipy.special import pdtrc
 
 from analysis.identification.markers.markers import Markers
 from analysis.identification.over_time.assignment import well_known
@@ -21,8 +23,11 @@ _BY_CHANCE_P = 1e-6  #: that other spots make as many markers at a time that is 
 _APART_M = 0.3  #: of two times: so far behind the right place none of a marker's own spots counts
 _NEAR_M = 0.06  #: so near to the path is a marker on it: the others may differ a little among themselves
 _AGREE_M = 0.03  #: so far may the jumper have moved for three rays still to meet
-_SAMPLE = 8  #: pulses that are tried with other times
-_LEAST_AGREEING = 6  #: points more than on time
+_COARSE = 3  #: steps of the time that are taken at once at first
+_FEW_PULSES, _MANY_PULSES = 8, 32  #: that are tried with other times, at first and in the end
+_PLACES: Final = 4  #: cameras and times that are tried in more pulses
+_NEARLY: Final = 0.9  #: of the most spots: at such times, too, the camera may show him
+_TIMES, _SIGMAS = 1.5, 4.0  #: as many spots as on time, and so much more than chance
 _MOST_PULSES, _MOST_S = 1.5, 0.02  #: greatest offset, the greater of the two
 
 
@@ -79,23 +84,36 @@ def _met(views: Views, window: Window, markers: Markers, k: int, expected: Flags
 
 
 def _off_a_little(views: Views, window: Window, markers: Markers, flight: Flight) -> Floats:
-    """The camera that is so little late that every two cameras agree, but no three: when would three agree?"""
+    """The camera that is so little late that every two cameras agree, but hardly three: when would three agree?
+
+    At wrong times other spots meet by chance, and names that these lead to hide that a camera is late. So the spots
+    that three cameras agree in are counted at all times, first in a few pulses and with large steps.
+    """
     late = np.zeros(len(views))
     rays = (markers.assigned.rays >= 0).sum(axis=2)
     seen = np.sum([views.inside(k, flight.place(window.time_s)) for k in range(len(views))], axis=0)
-    able = (seen >= _LEAST_CAMERAS) & (rays >= 2).any(axis=1)
-    if not able.any() or not _too_rarely_three(rays[able], int(np.median(seen[able]))):
-        return late
-    chosen = np.flatnonzero(able)
-    chosen = chosen[np.linspace(0, len(chosen) - 1, min(_SAMPLE, len(chosen))).astype(int)]
+    able = np.flatnonzero((seen >= _LEAST_CAMERAS) & (rays >= 2).any(axis=1))
     step = _AGREE_M / float(np.linalg.norm(flight.motion[1]))
-    offsets = np.arange(-_MOST_S, _MOST_S + step, step)
-    part = window.part(chosen)
-    counts = np.array([[_agreeing(part(_only(views, k, float(o)))) for o in offsets] for k in range(len(views))])
-    k, best = np.unravel_index(counts.argmax(), counts.shape)
-    if counts[k, best] >= 2 * _agreeing(part(late)) + _LEAST_AGREEING:
-        late[k] = float(offsets[counts[k] > 0.9 * counts[k, best]].mean())
+    if not len(able) or step >= _MOST_S:  # he is too slow for times to differ
+        return late
+    coarse = np.arange(-_MOST_S, _MOST_S + step, _COARSE * step)
+    some, more = (window.part(_spread(able, count)) for count in (_FEW_PULSES, _MANY_PULSES))
+    counts = np.array([[_agreeing(some(_only(views, k, float(o)))) for o in coarse] for k in range(len(views))])
+    most = on_time = _agreeing(more(late))
+    for place in np.argsort(-counts, axis=None)[:_PLACES]:
+        k, i = divmod(int(place), len(coarse))
+        offsets = coarse[i] + np.arange(-_COARSE, _COARSE + 1) * step
+        fine = np.array([_agreeing(more(_only(views, k, float(o)))) for o in offsets])
+        found = int(fine.max())
+        clear = found > _TIMES * on_time and found - on_time > _SIGMAS * np.sqrt(found + on_time)
+        if clear and found > most:
+            most, late = found, _only(views, k, float(offsets[fine > _NEARLY * found].mean()))
     return late
+
+
+def _spread(steps: Integers, count: int) -> Integers:
+    """So many of some steps, spread over them."""
+    return np.asarray(steps[np.linspace(0, len(steps) - 1, min(count, len(steps))).astype(int)])
 
 
 def _only(views: Views, k: int, offset: float) -> Floats:
@@ -105,12 +123,10 @@ def _only(views: Views, k: int, offset: float) -> Floats:
 
 
 def _agreeing(window: Window) -> int:
-    """How many points three cameras or more show."""
-    return sum(int((points.count > 2).sum()) for points in window.points)
+    """How many spots have rays that meet those of two other cameras: where points share spots, these count once."""
+    return sum(_spots(points.rays[points.count >= _LEAST_CAMERAS]) for points in window.points)
 
 
-def _too_rarely_three(rays: Integers, cameras: int) -> bool:
-    """Whether points with three rays are much rarer than chance would have it if markers were missed one by one."""
-    two, three = int((rays >= 2).sum()), int((rays > 2).sum())
-    shown = rays[rays >= 2].mean() / cameras
-    return bool(three / two < _AGREES * bdtrc(2, cameras, shown) / bdtrc(1, cameras, shown))
+def _spots(rays: Integers) -> int:
+    """Number of different spots of all cameras."""
+    return sum(len(np.unique(of[of >= 0])) for of in rays.T)

@@ -1,7 +1,7 @@
 """The rows that a measured log gives to the tables of a season, and the columns of these tables.
 
-The worker writes them beside the log as CSV without a header, since whoever makes one table of ten thousand logs must
-only join files then. Names of columns end in their unit; a cell is empty where nothing was measured.
+The worker writes them beside the log as CSV without a header, so that one table of ten thousand logs is made by joining
+files. Names of columns end in their unit; a cell is empty where nothing was measured.
 """
 
 import csv

@@ -30,9 +30,7 @@ from rig.tag import CameraTag, TripletTag
 
 _MEMORY = 192 << 20  # bytes of regions that are kept for a second look; the oldest pulses make room
 
-_FITS_OF_OTHERS = (
-    20  # places that are fitted in other regions than the largest one of an image: four markers, and what beats them
-)
+_FITS_OF_OTHERS = 20  # places of each region but the largest: four markers, and clearer false ones
 _FITS_OF_STILL = 8  # places in a region that hardly moves: a jumper who passes it shows four markers
 
 
@@ -53,7 +51,7 @@ class Finder:
     def find(self, tag: TripletTag, image: Grey) -> PulseCandidates:
         """The candidates of a pulse; keeps what a second look needs.
 
-        Few places are fitted in what was in the same part of the image a moment ago, as people who stand and walk.
+        In regions that were in front at the same place a moment ago (people who stand or walk) few places are fitted.
 
         Args:
             tag: of the pulse; pulses come in order.

@@ -181,7 +181,7 @@ class Sighting:
     def _by_skis(
         self, markers: Markers, skis: Sequence[MeasuredSkis], look: SecondLook, steps: Flags
     ) -> tuple[Markers, Sequence[MeasuredSkis]]:
-        """Markers and skis where bindings have led to few: by skis that are sought without them, if these are more."""
+        """Markers and skis where bindings led to few skis: from a search without bindings, if it finds more skis."""
         views, window, flight = self.views, self.window, self.flight
         beside = beside_skis(views, window, flight, markers, look)
         if beside is None:

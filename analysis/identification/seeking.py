@@ -1,7 +1,7 @@
 """Seeks a jumper in candidates as they come, several times a second, so that one who comes into sight is followed.
 
-What was computed for a pulse is kept for the next time. So is what was looked at and was no jumper: chance makes a
-track of flakes of snow, which stays the same while the jumper's own gets longer with every pulse.
+Results for a pulse are kept for the next search, and so are tracks that turned out to be no jumper: a chance track of
+snowflakes stays the same, while the jumper's own gets longer with every pulse.
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,7 +68,7 @@ class Seeker:
         return None
 
     def _sought(self, candidates: Sequence[PulseCandidates], rate_hz: float) -> list[PulseCandidates]:
-        """The candidates in which tracks are sought; their points in space are known then."""
+        """The candidates in which tracks are sought, with their points in space computed."""
         new = []
         for c in candidates:
             if c.pulse not in self._points and c.pulse >= self._due:

@@ -1,4 +1,4 @@
-"""How the skis of a jump turn from pulse to pulse: which fit contradicts the others, and where the others lead."""
+"""How the skis of a jump turn from pulse to pulse: fits that contradict those of other pulses, and predictions."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -15,7 +15,7 @@ from photogrammetry.jumper.stick_model import by_slope_and_heading, direction_of
 from rig.arrays import Flags, Floats
 
 SOUGHT_RAD: Final = np.radians((6.0, 2.0))  #: standard deviations of a direction that was sought: to the side, up
-FEWEST_TELLING: Final = 3  #: pulses that show a ski, so that it is believed at all
+FEWEST_TELLING: Final = 3  #: least pulses that show a ski
 #: Slope and heading (rad) of both skis as sums of their mean and of half their difference: (mean, velocity,
 #: acceleration), and the change of the acceleration within 0.1 s.
 _MIXING: Final = np.array([(1.0, -1.0), (1.0, 1.0)])
@@ -66,7 +66,7 @@ def smooth(found: Sequence[FittedBars | None], time_s: Floats, flight: Flight) -
 
 
 def led(found: Sequence[FittedBars | None], seen: Flags, time_s: Floats, flight: Flight) -> tuple[Floats, Flags]:
-    """Directions (t, 2, 3) to which the seen skis of the other pulses lead.
+    """Directions (t, 2, 3) predicted from the seen skis of the other pulses.
 
     Returns:
         The directions, and whether they are known better than those that are sought (t, 2).

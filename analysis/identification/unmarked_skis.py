@@ -24,17 +24,17 @@ from analysis.ski_bars.pixels import SkiView
 from rig.arrays import Flags, Floats
 
 _BODY: Final = [0, 1]  #: indices of helmet and hip in `POINTS`
-_KNOWN_M: Final = 0.3  #: standard deviation of a place from which on it tells nothing of the feet
+_KNOWN_M: Final = 0.3  #: standard deviation of a place from which on it is no use for the feet
 _SEARCHES: Final = 20  #: pulses in which skis are sought, about
-#: Standard deviations of what lines tell: forward, to the left, where cameras beside the hill tell least, and up,
-#: m, and of the direction, rad.
+#: Standard deviations of a ski found by lines: its place, m, forward, to the left (cameras beside the hill see that
+#: worst) and up; its direction, rad.
 _FOUND_M, _FOUND_RAD = np.array((0.15, 0.2, 0.08)), np.radians(5.0)
-_ALONG_M, _ACROSS_M = 0.1, 0.02  #: of a binding from where the middle of a fitted ski tells it
+_ALONG_M, _ACROSS_M = 0.1, 0.02  #: of a binding from its place on a fitted ski
 #: Logarithm of how much likelier than none a ski is in a pulse that shows it.
 _GAIN: Final = 5.0
-_MARKER_M, _SIGMAS = 0.06, 3.0  #: of a binding's marker from the axis of its ski; so many are too many
+_MARKER_M, _SIGMAS = 0.06, 3.0  #: of a binding's marker from the axis of its ski, and at most
 _FEWEST: Final = 3  #: pulses that show both skis
-#: Share of the pairs that lines lead to which fits must confirm: where they refuse most of them, the rest is chance.
+#: Share of the pairs found by lines that fits must confirm: where they refuse most, the rest is chance.
 _CONFIRMED: Final = 0.5
 _IMAGES: Final = 2
 
@@ -87,7 +87,7 @@ def _fitted(views: Sequence[SkiView], poses: Poses, axes: Floats) -> FittedBars:
 
 
 def _feet(markers: Markers, flight: Flight) -> tuple[Floats, Floats, Flags]:
-    """Places (t, 3) half way between both bindings by helmet and hip, covariances, and where these tell any (t,)."""
+    """Places (t, 3) between both bindings by helmet and hip, covariances, and where there is one (t,)."""
     at = markers.places(_BODY)
     known: Flags = np.asarray(np.linalg.eigvalsh(at.covariance)[..., -1] < _KNOWN_M**2)
     own: list[Floats] = []
@@ -109,7 +109,7 @@ def _feet(markers: Markers, flight: Flight) -> tuple[Floats, Floats, Flags]:
 
 
 def off_skis(views: Views, window: Window, markers: Markers, skis: Sequence[MeasuredSkis]) -> Flags:
-    """Which bindings (t, 2) are named beside their skis; where no image shows both, as at the next pulse that does."""
+    """Which bindings (t, 2) lie off their skis; a pulse without both is judged as the next pulse that shows both."""
     told, off = np.zeros((2, len(window), SKIS), bool)
     for t, of_pulse in enumerate(skis):
         for k, name in enumerate(views.names):

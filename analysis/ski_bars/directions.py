@@ -200,7 +200,7 @@ class _Place:
             chord = px[1] - px[0]
             turn = np.arctan2(chord[..., 1], chord[..., 0])
             middle = np.angle(np.exp(2j * turn).sum()) / 2
-            # a line looks the same from both ends
+            # a line has the same sums from both ends
             off = (turn - middle + np.pi / 2) % np.pi - np.pi / 2
             turns = np.arange(off.min(), off.max() + _TURNS * step, _TURNS * step)
             lines = _line_sums(view, _Bundle(xy, scale, middle + turns, min(_STEP_M, step), sigma_m), self.taken)

@@ -23,15 +23,15 @@ from rig.arrays import Flags, Floats, Reals
 _ALONG_PX, _ACROSS_PX = 10.0, 1.5  # over which errors of the model are alike
 _TOGETHER: Final = 2 * _ALONG_PX * 2 * _ACROSS_PX / CELL_PX  # cells with one error
 _MODEL, _LEAST_MODEL = 0.1, 0.02  # m before the residuals tell it, and at least
-#: m from which on something else than skis is in sight there.
+#: A larger m means that the pixels show something else than skis.
 WORST_MODEL: Final = 0.2
 _SHOVEL: Final = 0.3  #: m of the shovel, whose form is not that of the model
 _SIGMAS = 3.0  # residuals that count a quarter
 _MAD_TO_SIGMA = 1.4826
-_TAILS = 1.25  # times m in covariances: the tails of its errors, which their median does not tell
-_BESIDE_PX = 2.0  # beside a ski, whose pixels still tell m
+_TAILS = 1.25  # factor of m in covariances, for the tails of its errors, which the median leaves out
+_BESIDE_PX = 2.0  # distance beside a ski within which pixels are used to estimate m
 _ITERATIONS: Final = 20
-_ENOUGH, _NEAR = 0.05, 0.8  # of a standard deviation: smaller steps change nothing, and not much
+_ENOUGH, _NEAR = 0.05, 0.8  # of a standard deviation: steps that end the iteration at last, and those before
 _DAMPED, _DAMPED_MORE = 1e-3, 0.1  # at first, and at least where a step has made the sum larger
 _BLUR_PX, _BLUR_LOG = 0.65, 0.25
 _HALF_M, _HALF_LOG = 0.035, 0.4  # half the width that a ski shows, and its spread

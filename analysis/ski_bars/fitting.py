@@ -20,8 +20,8 @@ _WORST_PX: Final = 1.0  #: sigma of a line across it, at most
 _CONTRADICTION: Final = float(chdtri(REDUNDANCY, 1e-4))  #: one sound image in ten thousand contradicts the others more
 #: With width and brightness: noise alone gives more in one image of a million.
 _EVIDENCE: Final = float(chdtri(REDUNDANCY + 2, 1e-6))
-_FREE: Final = 0.5  #: of the pixels of a ski that show the static scene beside which no ski may be, at most
-_TELLING_CELLS: Final = 12  #: pixels that tell a ski from the static scene, at least, so that they tell anything
+_FREE: Final = 0.5  #: largest share of a ski's pixels that may show the static scene
+_TELLING_CELLS: Final = 12  #: least number of pixels that can tell a ski from the static scene
 _FEWEST: Final = 2  #: images that show a ski
 _SCENE_SIGMAS: Final = 3.0  # of the noise, within which a pixel shows the static scene
 _CORE: Final = 0.8  # of a pixel that a ski covers, so that it shows hardly anything else
@@ -89,7 +89,7 @@ def fit_bars(
 
 
 def _judged(fit: BarFit, found: Estimate, good: Flags, lines: list[list[ImageLine | None]]) -> FittedBars:
-    """Without what was refused, fitted once more."""
+    """The fit after another one without the refused images."""
     if found.model_error >= WORST_MODEL:
         good[:] = False
     if (good != fit.used).any():
@@ -138,7 +138,7 @@ def _good(lines: list[list[ImageLine | None]]) -> Flags:
 
 
 def _free(fit: BarFit, found: Estimate) -> Flags:
-    """(2,) which skis would hide what an image shows of the static scene.
+    """(2,) which skis cannot be there: an image shows the static scene where they would hide it.
 
     An image that does not show a ski may be left out: something hides the ski, or the scene is as bright. Where the
     scene itself is seen, and another grey than that of the ski, there is no ski.

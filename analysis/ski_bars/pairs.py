@@ -37,10 +37,10 @@ _SIGMAS: Final = 2.5  #: so far from what is expected
 _REFINED: Final = 2  #: times as many skis as are wanted are sought on a finer grid
 _BETWEEN: Final = np.array((-0.5, 0.0, 0.5))  #: steps of that one
 _FIRST: Final = 3  #: first skis of a pulse, each of which gets a second one on either side
-#: A pair's first ski is another one if it is so far from the others, m, or turned so much.
+#: Two skis count as different ones if they are so far apart, m, or differ so much in direction.
 _OTHER_M, _OTHER_RAD = 0.16, np.radians(10.0)
 _FEET_M_S: Final = 1.0  #: how fast feet move against the body
-_ELSEWHERE: Final = -50.0  #: logarithm, of a line farther from the feet in an image than any that was looked at
+_ELSEWHERE: Final = -50.0  #: gain (logarithm) of a line farther from the feet than all lines that were looked at
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,7 +199,7 @@ def _are_others(one: _Ski, other: _Ski) -> bool:
 
 
 def _told(view: SkiView, table: LineTable, place: Floats, direction: Floats, at: Floats) -> Floats:
-    """What an image tells of skis with n directions at o places, logarithms (n, o)."""
+    """Evidence of an image for skis with n directions at o places, logarithms (n, o)."""
     by_place = view.camera.linearised(place[None], table.xy[None])[1].reshape(2, 3)
     ends = view.camera.project(place + np.array(USUAL_SHAPE[1:])[:, None, None] * direction)
     if not np.isfinite(ends).all():

@@ -40,7 +40,7 @@ TEXTS: Final = {
 
 
 def said(key: str, **values: object) -> Said:
-    """A text with its values, of which a `Said` stands in each language's text as it is said there."""
+    """A text with its values; a value that is itself a `Said` appears in each language's own words."""
     return Said(
         *(
             TEXTS[key][place].format(

@@ -2,7 +2,7 @@
 
 Never more than two tasks per thread are under way, so that the scheduler's memory does not grow with the season, and
 the number of workers never changes (decision 0077). A task whose worker dies is run again when all others are done,
-alone: a worker that dies then dies by it. A task counts as running when its worker has begun it.
+alone: if a worker dies then, this task is the cause. A task counts as running when its worker has begun it.
 """
 
 import logging
@@ -45,7 +45,7 @@ _CONFIGURED: Final = {
 
 
 class Hearer(Protocol):
-    """Is told what becomes of the tasks of a run."""
+    """Receives the progress of the tasks of a run."""
 
     def started(self, name: str) -> None:
         """A worker has begun a task, or begun it again."""
@@ -57,7 +57,7 @@ class Hearer(Protocol):
         """Tasks are under way; called every two seconds or more often."""
 
     def done(self, name: str, result: Any) -> None:
-        """A task has ended; what it has returned."""
+        """A task has ended, with this result."""
 
     def failed(self, name: str, error: BaseException) -> None:
         """A task has ended by an error."""
@@ -73,7 +73,7 @@ class Engine:
     Attributes:
         client: connected to its scheduler.
         dashboard: address of Dask's own page; None if there is none.
-        restore: has workers started again that were lost, which Dask gives up if they die while they start.
+        restore: starts lost workers again; Dask itself gives up those that die while they start.
     """
 
     client: Client
@@ -291,14 +291,14 @@ class _Run:
             try:
                 result = future.result(timeout=_CONNECT_S)
             except (TimeoutError, KilledWorker, CancelledError):
-                self._names[future] = name  # its worker has died with it: the next look tells more
+                self._names[future] = name  # its worker has died with the result: its state is looked at again
                 return
             del self._arguments[name]
             self._hearer.done(name, result)
         elif future.status == "pending":
-            self._names[future] = name  # its worker died with what it had returned, and Dask runs it again
+            self._names[future] = name  # its worker died with the result, and Dask runs it again
         elif future.status == "lost" and self._on.client.status == "running" and not self._last:
-            self._suspect(name)  # likewise, and Dask does not
+            self._suspect(name)  # its worker died with the result, and Dask does not run it again
         elif future.status != "error":
             raise _gone(f"a task is {future.status}")
         else:
@@ -311,7 +311,7 @@ class _Run:
         del self._arguments[name]
         if not isinstance(error, KilledWorker):
             self._hearer.failed(name, error)
-        else:  # or it is another's scheduler, which has tried more often itself
+        else:  # also where a scheduler of somebody else has tried more often itself
             limit = format_bytes(error.last_worker.memory_limit) if error.last_worker.memory_limit else "its"
             self._hearer.killed(name, limit)
 

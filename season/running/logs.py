@@ -40,7 +40,7 @@ class SeasonLog:
 
     @property
     def is_settled(self) -> bool:
-        """Whether what came of it holds: neither the log nor how it is measured has changed since."""
+        """Whether its outcome is up to date: neither the log nor the way of measuring has changed since."""
         found = self.outcome
         return found is not None and (found.recipe, found.stamp) == (self.orienting.recipe, self.entry.stamp)
 
@@ -78,7 +78,7 @@ def _is_first(entry: Entry) -> bool:
 
 
 def with_outcomes(logs: Sequence[SeasonLog], outcomes: Mapping[str, Outcome]) -> list[SeasonLog]:
-    """The logs with what has come of them since, by their address; a result that does not hold any more is none."""
+    """The logs with their newest outcomes, by address; an outcome that is out of date is left out."""
     return [replace(log, outcome=outcomes.get(log.url, log.outcome if log.is_settled else None)) for log in logs]
 
 

@@ -1,4 +1,4 @@
-"""What came of a log: a small file in the folder of its result, by which it is known to be measured already."""
+"""The outcome of a log: a small file in the folder of its result, which shows that the log was measured already."""
 
 import hashlib
 from dataclasses import dataclass
@@ -95,7 +95,7 @@ def key_of(log_sha256: str, recipe: str) -> str:
 
 
 def decoded(content: bytes | None) -> Outcome | None:
-    """An outcome as it was written; None if there is none, or it is of another program."""
+    """An outcome read from its file; None without a file, or if another program wrote it."""
     if content is None:
         return None
     try:
@@ -106,7 +106,7 @@ def decoded(content: bytes | None) -> Outcome | None:
 
 
 def encoded(outcome: Outcome) -> bytes:
-    """An outcome as it is written."""
+    """The content of an outcome's file."""
     return msgspec.json.encode(outcome) + b"\n"
 
 

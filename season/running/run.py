@@ -18,7 +18,7 @@ from season.running.stores import left_behind, read_outcomes
 from season.running.task import give_up, measure
 
 _LOCK: Final = ".lock"
-#: Logs one after the other whose store did not answer, each for a minute: then it will not for the others either.
+#: After so many logs in a row whose store did not answer, each for a minute, the run ends.
 _SILENCES: Final = 5
 _LOCK_FLAGS: Final = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
@@ -53,7 +53,7 @@ def measure_logs(
     started: Callable[[int, int, str | None], None],
     progress: Callable[[int], None],
 ) -> tuple[list[SeasonLog], SeasonState]:
-    """Measure the logs of a campaign of which nothing has come yet.
+    """Measure the logs of a campaign that have no result yet.
 
     Args:
         campaign: it.
@@ -61,7 +61,7 @@ def measure_logs(
         dashboard: address of the dashboard of a cluster of this computer.
         started: called when workers are there, with the number of logs to measure, of threads, and the dashboard's
             address; not called if there is nothing to do.
-        progress: called with the number of logs of which something has come in this run.
+        progress: called with the number of logs that this run is done with.
 
     Returns:
         The logs with what came of them, and the state.

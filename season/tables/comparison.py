@@ -1,4 +1,4 @@
-"""Whether athletes differ from the others: by the days that they share, corrected for how many are compared.
+"""Whether athletes differ from the others: by the days that they share, corrected for the number of comparisons.
 
 On a day and hill everybody has the same snow, wind to a degree, and the same calibration, so the differences of one day
 have these in common and their scatter over the days says how sure the mean difference is (a t test of the days'
@@ -85,7 +85,7 @@ def groups(
 ) -> list[Group]:
     """Means of a quantity of good jumps by athlete, and how they differ from those of the others.
 
-    Others are compared that jumped on the same day and hill; also from the same gate if it is among `by`.
+    The others are those who jumped on the same day and hill, and from the same gate if it is among `by`.
 
     Args:
         database: the tables.

@@ -50,7 +50,7 @@ _JUMPS: Final = """
             FROM rows_jumps AS rows JOIN logs USING (key) WHERE logs.copy_of IS NULL)
     ORDER BY time_utc, log, jump
 """
-#: Logs whose jumps equal those of another log of the hill bit by bit: an archive is another file with the same images.
+#: Logs whose jumps equal those of another log of the hill bit by bit: an archived copy of the same images.
 _ARCHIVES: Final = """
     WITH measured AS (SELECT key, list(hash({columns}) ORDER BY jump) AS found FROM rows_jumps GROUP BY key),
     originals AS (

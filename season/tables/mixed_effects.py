@@ -3,7 +3,8 @@
     value = mean + hill + athlete + day on the hill + rest
 
 Hills are fixed effects, against the first of them; athletes and days are random ones, whose standard deviations are
-estimated by REML. An athlete's effect is its best prediction, shrunk to the mean as far as few jumps say little.
+estimated by REML. An athlete's effect is its best linear unbiased prediction: the fewer the jumps, the more it is
+shrunk to the mean.
 """
 
 import math
@@ -68,7 +69,7 @@ class MixedEffects:
         athletes: against their mean, from the largest to the smallest.
         first_hill: its name.
         sd_athletes, sd_days, sd_rest: standard deviations of athletes, of days, and of jumps of one athlete on one day.
-        sigma: root mean square of the jumps' standard deviations of measurement, which `sd_rest` holds too.
+        sigma: root mean square of the jumps' standard deviations of measurement; `sd_rest` includes them.
     """
 
     jumps: int

@@ -33,10 +33,10 @@ _STRIP = 32 << 10  # pixels that are compared at a time
 _FRONT = 4.5  # sigmas: 2 of 300 000 pixels by chance
 _SMALLEST = 12  # px; 15 radii of the smallest marker that can be measured: a jumper is larger
 _SPECK = 8  # pixels of the border of the smallest marker that can be measured
-_REACH = 0.7  # of the length of the largest part of a body that stands out: other parts are not farther from it
-_DARKEST = 0.1  # of the light of the static scene, below which an image shows nothing of it
-_COINCIDENCE = 0.1  # probability of so many specks about a body by chance, below which they belong to it
-_THINNEST = 3  # px; nothing real is thinner at its thickest, but a row of pixels that hold a number is
+_REACH = 0.7  # lengths of the largest visible part of a body: its other parts are nearer than this
+_DARKEST = 0.1  # least gain: below it, an image does not show the static scene
+_COINCIDENCE = 0.1  # probability of so many chance specks around a body; below it, the specks belong to the body
+_THINNEST = 3  # px, least thickness of a thing; a row of pixels with the camera's signature is thinner
 _JOIN = 9  # px: what is nearer to each other belongs together
 _MARGIN = 10  # px around what moves
 _MOST = 6  # regions of an image, the largest ones
@@ -192,7 +192,7 @@ class Background:
         return grey, np.asarray(cv2.add(self._grey, shifted), np.float32), moment.shift
 
     def shift(self, image: Grey) -> Floats:
-        """How far (2,), px, an image shows things from where the static scene has them."""
+        """The shift (2,), px, of an image against the static scene."""
         return self._moment(image).shift
 
     def part(self, image: Grey, low: Integers, high: Integers) -> Region | None:
@@ -302,7 +302,7 @@ class _Moment:
 
     @property
     def shift(self) -> Floats:
-        """How far (2,), px, things are from where the static scene has them."""
+        """The shift (2,), px, of the image against the static scene."""
         return -np.array((self.right, self.down)) / self.light
 
 

@@ -1,8 +1,8 @@
 """Tells the parts of images that hardly move from those that may hold a jumper.
 
 Somebody with skis of 2.5 m who moves by 12 m/s at least leaves half of the box around him within a tenth of a second.
-Officials, spectators, flags and trees stay where they are. What a camera sees move along its axis stays in its box as
-well, and so may a jumper behind a tree; so nothing that is found here to be still is left out altogether.
+Officials, spectators, flags and trees stay where they are. So does the image of somebody who moves along the camera's
+axis, or of a jumper behind a tree: a region that is still is searched less, but never left out.
 """
 
 from collections import deque
@@ -26,7 +26,7 @@ class Pace:
         self._boxes: deque[tuple[UtcNs, Floats]] = deque()
 
     def still(self, time: UtcNs, regions: Sequence[Region]) -> Flags:
-        """Which regions of the next image were in the same places a moment ago; none if no image of then is known.
+        """Which regions of the next image were in the same places a moment ago; none without an image of that time.
 
         Args:
             time: of the image, later than those before.

@@ -21,7 +21,7 @@ from rig.arrays import Flags, Floats, Integers
 
 UNKNOWNS: Final = 9  #: x, y, logarithm of the radius, contrast, and what is behind: level, slopes and bends
 _BEHIND = 5  # index of the first slope
-_MARGIN = 1.6  # px beyond the disc that are fitted: what lies farther away tells of other things, not of the disc
+_MARGIN = 1.6  # px beyond the disc that are fitted: pixels farther away show other things
 _STARTS_AWAY = 0.55  # radii, of the starts in eight directions about a place
 _MOVED = 1.3  # radii: a centre that ends farther from its start belongs to something else
 _STEPS, _LAST_STEPS, _ENOUGH = 12, 4, 3e-3  # iterations, with all pixels and with those that agree; px
@@ -30,17 +30,17 @@ _BLOCK = 48  # windows whose pixels are computed at a time: they stay in the pro
 _TINY = np.float32(1e-12)
 _MODEL = 0.015  # of the contrast, standard deviation: uneven light on marker and suit, pixels cut by a border
 _HALF = 3.0  # standard deviations at which a pixel counts a quarter and less (Geman and McClure 1987)
-_USUAL = 0.84  # so much counts a pixel on average whose residual is but noise
-_ALONE, _TOGETHER = 4.0, 3.0  # standard deviations: a pixel, or the mean of 3 x 3, that is off by more does not belong
+_USUAL = 0.84  # mean weight of a pixel whose residual is noise alone
+_ALONE, _TOGETHER = 4.0, 3.0  # standard deviations: residual of a pixel, and of the mean of 3 x 3, that rejects it
 _SLOPE = 0.015  # of the contrast per px, standard deviation of the slopes of what is behind
 _BEND = 0.05  # of the contrast, standard deviation of what bends add to them where the fitted pixels end
-_UNCOVERED = 0.8  # share of the disc that counts, with which one start is enough
-_NEARLY = 4.0  # pixels that another minimum may explain worse than the best one
-_SHARE = 0.4  # of the disc and of its border that must agree: of less than a half, other circles explain as much
+_UNCOVERED = 0.8  # visible share of the disc from which on one start is enough
+_NEARLY = 4.0  # pixels that another minimum may explain worse than the best one and still widen the covariance
+_SHARE = 0.4  # share of disc and border that must agree: less than half a disc fits other circles as well
 _LIKE = 2.0  # standard deviations by which its contrast may differ
-_WORST = 1.0  # radii; a centre that is less certain than this says nothing
-_FIRST_STEPS, _KEPT = 4, 3  # iterations after which only so many of the starts of a place go on
-_TELLING = 24  # places that tell what all discs are like
+_WORST = 1.0  # radii: a centre with a larger sigma is not used
+_FIRST_STEPS, _KEPT = 4, 3  # iterations; starts of a place that go on after them
+_TELLING = 24  # places, spread over all, from which size and contrast of the discs are estimated
 _MAD_TO_SIGMA = 1.4826
 _COMMON = 0.1  # standard deviation of the logarithm of how much larger they all are than expected
 
@@ -129,14 +129,14 @@ def fit_known_discs(windows: Windows, shape: DiscShape) -> KnownDiscs:
 
 
 def _as_clear_ones(windows: Windows, shape: DiscShape, places: Integers) -> DiscShape:
-    """The shape with size and contrast of those discs among some places that are not covered.
+    """The shape with size and contrast estimated from the discs in full view among some places.
 
-    What is expected comes from spots that are no discs yet: covered ones are smaller and fainter, and a lens may blur
-    otherwise than `BLUR_PX`. A contrast that is hardly known lets a faint disc explain what is left of a covered one.
+    The expected shape comes from soft spots: covered markers make smaller and fainter ones, and the lens may not blur
+    by `BLUR_PX`. With a loose contrast, a whole faint disc would explain the rest of a covered one.
     """
     found = _solved(windows, shape, Profiles(shape.radius), places, windows.xy[places])
     off = found.theta[:, 2] - np.log(shape.radius[places] / middle_size(shape.radius))
-    # Each is weighted towards what was expected; without that its image alone tells more, and less surely.
+    # Each fit contains the expected size as a prior; here the prior is taken out again.
     told = 1 / found.covariance[:, 2, 2]
     clear = (found.share >= _UNCOVERED) & (told > shape.spread**-2)
     alone = told[clear] - shape.spread**-2
@@ -185,7 +185,7 @@ class _Solutions:
 
 
 def _best(windows: Windows, shape: DiscShape, owner: Integers, found: _Solutions) -> KnownDiscs:
-    """The best of the solutions of each place, with the scatter of those that are about as good."""
+    """The best solution of each place; the scatter of those that fit about as well adds to its covariance."""
     n = len(windows.xy)
     moved = np.linalg.norm(found.theta[:, :2] - windows.xy[owner], axis=1)
     sound = np.isfinite(found.cost) & (moved < _MOVED * shape.radius[owner]) & (found.share > _SHARE)
@@ -199,7 +199,7 @@ def _best(windows: Windows, shape: DiscShape, owner: Integers, found: _Solutions
     for i in np.flatnonzero(np.isfinite(least)).tolist():
         mine = np.flatnonzero((owner == i) & sound & (found.cost < least[i] + _NEARLY * _HALF**2))
         best = mine[found.cost[mine].argmin()]
-        # What one pixel explains is as good as nothing: borders of what covers a disc are no part of the model.
+        # A difference of one pixel is not significant: the model leaves out the borders of covering things.
         weight = np.exp((least[i] - found.cost[mine]) / (2 * _HALF**2))
         weight /= weight.sum()
         off = found.theta[mine, :2] - found.theta[best, :2]
@@ -220,9 +220,9 @@ def _solved(windows: Windows, shape: DiscShape, tables: "Profiles", which: Integ
     fit.leave_out(whole)
     theta, _, normal = fit.iterated(whole, _LAST_STEPS)
     pulled = theta - whole
-    # The border of what covers a disc pulls at it; by how much is known no better than what leaving it out changes.
+    # The border of a covering thing shifts the fit; the change when it is left out is the sigma of that error.
     covariance = np.asarray(np.linalg.inv(normal) + pulled[:, :, None] * pulled[:, None])
-    # What is behind is no plane with a bend either: what these do to the disc is known no better than its own size.
+    # The background is not exactly a plane with bends: their effect on the disc is taken as its own sigma.
     of_disc, behind = normal[:, :_BEHIND, :_BEHIND], normal[:, :_BEHIND, _BEHIND:] @ theta[:, _BEHIND:, None]
     bent = np.linalg.solve(of_disc, behind)
     covariance[:, :_BEHIND, :_BEHIND] += bent @ bent.swapaxes(1, 2)
@@ -295,13 +295,13 @@ class _Fit:
         return theta, cost, normal
 
     def leave_out(self, theta: Floats) -> None:
-        """Use neither what does not agree with the discs nor its neighbours any more."""
+        """Take pixels that do not agree with the discs, and their neighbours, out of the fit."""
         value, _ = self._model(theta, np.arange(len(theta)))
         parts = (self._used, (self._grey - value) * self._used, self._noise**2 * self._used)
         used, off, noise = (self._image(part) for part in parts)
         model = (_MODEL * self._shape.contrast) ** 2
         rejected = off**2 > _ALONE**2 * (noise + model)
-        # A lens spreads everything over some pixels: their mean tells more of it, and noise tells less.
+        # A lens spreads each thing over some pixels: in their mean it stands out of the noise more.
         count = np.maximum(_around(used), 1)
         rejected |= (_around(off) / count) ** 2 > _TOGETHER**2 * (_around(noise) / count**2 + model)
         self._used &= _around(rejected * used).reshape(len(theta), -1)[:, self._at] == 0

@@ -31,7 +31,7 @@ _SIZE_SPREAD = 0.4  # of log size
 _PENALTY = 3.0  # power of the misfit by which the covariance grows: 2 for noise, more for residuals that lie together
 _STEPS, _ENOUGH = 7, 5e-3  # iterations; px
 _POOR_START = 0.4  # residuals over contrast, before the first step
-_HOPELESS = {1: 0.5, 2: 0.35}  # by steps done: residuals over contrast that are larger will not get small enough
+_HOPELESS = {1: 0.5, 2: 0.35}  # by steps done: a fit with larger residuals over contrast is given up
 _LARGEST_STEP = 0.4  # of the logarithms
 
 
@@ -72,7 +72,7 @@ def fit_soft_discs(
         sigma: (rows, columns) noise of its grey values.
         xy: (n, 2) approximate centres.
         radius: (n,) approximate radii, px.
-        tight: something lies close around the spots: what a spot in a smaller window does not explain counts less.
+        tight: other things lie close around the spots: windows are smaller, and outlying pixels lose weight.
     """
     margin = _TIGHT if tight else MARGIN
     n = len(xy)
@@ -98,7 +98,7 @@ def fit_soft_discs(
 
 
 def _groups(reach: Floats) -> list[Integers]:
-    """Spots that are fitted together, by how far (n,) each one's pixels reach: all windows of a group are as large."""
+    """Groups of spots that are fitted together, from the reach (n,) of their windows: a group has one window size."""
     group = np.searchsorted(_GROUPS, reach)
     groups, waiting = [], np.empty(0, np.intp)
     for each in np.unique(group):
@@ -188,7 +188,7 @@ class _Batch:
         return self._judged(theta, normal, cost)
 
     def _promising(self, theta: Floats) -> Flags:
-        """Whether the spot to start from explains enough; no fit would mend larger residuals."""
+        """Whether the residuals of the start are small enough for a fit to succeed."""
         if self._robust:
             return np.ones(len(theta), bool)
         used = self._windows.weight > 0

@@ -24,11 +24,11 @@ _ANSWER = 5.0  # times its noise: of the Laplacian
 _NOISE_OF_ANSWER = 0.35  # standard deviation of the normalised Laplacian at scale 1 for noise 1; falls as 1 / scale
 _ROUND = 4.0  # ratio of the curvatures of a blob, at most
 MOST = 40  #: fits of a region
-_OF_PLACE = 3  # fits around one expected place: the marker, and what may be confused with it
+_OF_PLACE = 3  # fits around one expected place: the marker, and things that look like it
 _STRENGTH = 6.0  # contrast over its sigma
 _STRETCH = 0.75  # log of the ratio of the axes: a streak of 26 m/s and 2 ms is no longer
 _MISFIT = 0.25  # residuals over contrast
-_TIGHT, _TIGHT_MISFIT = 14, 0.15  # places that are fitted again in smaller windows, and what is asked of them there
+_TIGHT, _TIGHT_MISFIT = 14, 0.15  # places that are fitted again in smaller windows, and the largest misfit there
 _THINNEST = 4  # px; a smaller part of a region holds no spot
 _GAP = 26  # px between regions on the sheet
 _WORST_SIGMA = 0.5  # px
@@ -150,7 +150,7 @@ def _near(region: Region, expected: Expected) -> _Places | None:
 
 
 def _fitted(images: Sequence[Sequence[_Places]], strength: float) -> list[Spots]:
-    """The spots of each image near some places; what lies close around one counts less if it spoils the fit."""
+    """The spots of each image near some places; where a fit fails, the place is fitted again in a smaller window."""
     places = [of_region for of_image in images for of_region in of_image]
     counts = [len(of_region.xy) for of_region in places]
     if not sum(counts):

@@ -1,12 +1,13 @@
 """Which binding is the left one, decided over all pulses at once.
 
-A binding that is seen alone looks like the other one, and a wrong pair beside it misleads the prediction of both. So
+A binding that is seen alone looks like the other one, and a wrong pair misleads the prediction of both bindings. So
 the points that were taken as bindings get their names once more as one path: hypotheses about all pulses compete, each
-with its own filter, and pay for what does not move as bindings do. What nearly as good hypotheses name otherwise is
-left out: it cannot be told. The hip goes with them: it is between the bindings, whichever of them is seen.
+with its own filter, at a cost for each movement that is unlike a binding's. A point stays without a name where a
+hypothesis that is nearly as good as the best names it otherwise. The filters also follow the hip, which is between the
+bindings, whichever of them is seen.
 
-What is no binding may still be a thing, such as a glove, that goes along with the body. Then its points come one after
-the other by no chance, and tell only once that they are false.
+A false point may be a thing that moves with the body, such as a glove. Its points in later pulses are then no further
+evidence of chance, so a hypothesis pays the full cost for the first of them only.
 """
 
 from collections.abc import Sequence
@@ -21,14 +22,14 @@ from rig.arrays import Flags, Floats, Integers
 #: What the two bindings may be at a pulse: index of the point that was taken as the P3 and P4; -1: none.
 #: Both as they are, both exchanged, and what else there is.
 _CHOICES = np.array([(0, 1), (1, 0), (0, -1), (1, -1), (-1, 0), (-1, 1), (-1, -1)])
-#: What they are if their names are right, by whether there is a point of each.
+#: The choice that keeps both names, by whether the right and the left binding have a point.
 _AS_THEY_ARE = {(True, True): 0, (True, False): 2, (False, True): 5, (False, False): 6}
 _HIP = 2  #: its place among the points
 _VELOCITY = slice(3, 6)  #: of the first part of `bindings`, their midpoint, in a state
 _BEAM = 12  #: hypotheses that go on to the next pulse
-_FALSE = 0.05  #: share of the points taken as a binding that are none
+_FALSE = 0.05  #: share of false points among those taken as a binding
 _WITHIN_M = 1.0  #: edge of the space in which such points were looked for
-#: Cost of a point that is no binding but chance.
+#: Cost of a false point.
 _BY_CHANCE = float(6 * np.log(_WITHIN_M) - 2 * np.log(_FALSE))
 _LIMBS_M_S = 4.0  #: standard deviation of the velocity of a thing that goes along with the body against the bindings'
 
@@ -70,7 +71,7 @@ class _Hypotheses:
 
 
 def name_bindings(time_s: Floats, xyz: Floats, covariance: Floats, strange: Floats, bindings: PathFilter) -> Integers:
-    """The names of what was taken as bindings.
+    """The names of the points that were taken as bindings.
 
     Args:
         time_s: (t,) of the pulses.
@@ -80,7 +81,7 @@ def name_bindings(time_s: Floats, xyz: Floats, covariance: Floats, strange: Floa
         bindings: how both and the hip move.
 
     Returns:
-        (t, 2) which of the two points is the one and which the other binding; -1: none, or not to be told.
+        (t, 2) index of the point that is the right, and the left binding; -1: none, or undecided.
     """
     there: Flags = np.asarray(np.isfinite(xyz).all(axis=2))
     parts = zip(there, np.nan_to_num(xyz), np.nan_to_num(covariance), strange, strict=True)
@@ -92,7 +93,7 @@ def name_bindings(time_s: Floats, xyz: Floats, covariance: Floats, strange: Floa
 
 
 def _followed(time_s: Floats, points: Sequence[_Points], bindings: PathFilter) -> _Hypotheses:
-    """The best hypotheses about all pulses, and that all names are right as they are, from one end to the other."""
+    """The best hypotheses about all pulses, in their given order; among them that all names are right."""
     mean, sigma = bindings.begin
     none = np.zeros((1, len(bindings.mixing[0])), bool)
     h = _Hypotheses(np.zeros(1), np.zeros((1, 0), int), mean[None], np.diag(sigma**2)[None], none)
@@ -120,7 +121,7 @@ def _by_chance(h: _Hypotheses, before: _Points, here: _Points, dt: float) -> Flo
 
 
 def _told(names: Integers, cost: Floats) -> Integers:
-    """What all hypotheses name alike that are nearly as good as the best; names (h, t, 2)."""
+    """The names on which all hypotheses agree that are nearly as good as the best; names (h, t, 2)."""
     best = names[int(cost.argmin())]
     rivals = names[np.flatnonzero(cost - cost.min() < DECISIVE)]
     return np.where(np.any(rivals != best, axis=0), -1, best)

@@ -173,7 +173,7 @@ def _renamed(assigned: Assigned, names: Integers) -> tuple[Floats, Floats]:
 
 
 def without_bindings(markers: Markers, left_out: Flags) -> Markers:
-    """The markers without points of some bindings, left_out (t, 2), and without single rays that these have named."""
+    """The markers without the bindings left_out (t, 2), and without single rays that were named by these."""
     out = np.zeros(markers.assigned.rays.shape[:2], bool)
     for place, marker in enumerate(BINDINGS):
         points: Flags = np.isfinite(markers.assigned.xyz[:, marker, 0])
@@ -192,7 +192,7 @@ def nearest_known(known: Flags) -> Integers:
 
 
 def _assigned(views: Views, window: Window, flight: Flight, xyz: Floats, covariance: Floats) -> Markers:
-    """Prediction and assignment in turns until nothing changes."""
+    """Predict and assign in turns until nothing changes."""
     parts = _parts(flight)
     rays = np.full((len(window), len(POINTS), len(views)), -2)
     before: tuple[Prediction, Assigned] | None = None
@@ -242,8 +242,8 @@ def _parts(flight: Flight) -> list[Part]:
 def _trusted(views: Views, named: Integers, window: Window, flight: Flight) -> Integers:
     """Names (t, 4) to begin with: of bindings those that are seen as a pair, which tell right from left themselves.
 
-    Where there are hardly any pairs, one of them may not be worn; then all are taken as the one that they are more
-    likely by where they lie beside the body and by the cameras that show them.
+    Where there are hardly any pairs, one binding may have no marker. Then all points get the one name that is likelier
+    by their side of the body and by the cameras that show them.
     """
     trusted = named.copy()
     both = (named[:, BINDINGS] >= 0).all(axis=1)

@@ -25,14 +25,14 @@ from analysis.measurements.model import POINTS
 from rig.arrays import Flags, Floats, Integers
 
 _SPREAD = 0.04  #: standard deviation of the logarithm of a marker's radius: they are made alike, cloth bends them
-#: Spots of a marker that tell its size; likewise of a camera, below which those of all cameras do; discs that markers
-#: have among so many spots as tell whether they are markers, where few spots of any are discs.
+#: Least spots: of a marker for its size; of a camera for a size of its own, else that of all cameras is taken; and
+#: expected discs of a marker from which on their absence says that it is not worn.
 _FEW = 6
-_LIT = 0.75  #: of the light of a whole marker, what three quarters of one have
+_LIT = 0.75  #: share of the brightest marker's contrast from which on a marker may be in full view
 _SMALLEST_PX = 0.5  #: a smaller radius cannot be told from the blur
 _NEAR = 1.5  #: radii from a predicted place to a spot that may be the marker's
-_SURE = 1.5  #: radii; where a prediction is less certain, a disc beside it would be another one's
-_ITSELF = 0.25  #: radii from a spot to the disc that it is; a disc beside something else is farther away
+_SURE = 1.5  #: radii: around a less certain prediction, a disc may belong to another marker
+_ITSELF = 0.25  #: radii from a spot to its own disc, at most; a farther disc is another thing
 _MOST = 0.5  #: of the spots of a marker are discs
 
 
@@ -130,11 +130,10 @@ class _Seen:
         self._discs += np.bincount(places.marker[places.named & _itself(places, discs)], minlength=len(POINTS))
 
     def worn(self) -> Flags:
-        """Which markers (4,) are markers.
+        """Which markers (4,) the jumper wears.
 
-        In some pictures hardly any marker is a disc that can be fitted; then many spots tell of helmet and hip, few
-        nothing. Legs cover bindings, one more than the other, so these are compared with each other, and nothing is
-        told of them in such pictures.
+        In some pictures hardly any marker can be fitted as a disc. Then helmet and hip are judged only by many spots,
+        and bindings not at all. Elsewhere the bindings are compared with each other, since legs cover both.
         """
         share = self._discs / np.maximum(self._spots, 1.0)
         enough = self._spots >= _FEW
@@ -147,7 +146,7 @@ class _Seen:
 
 
 def _fitted(views: Views, window: Window, k: int, places: _Places, shape: DiscShape, look: SecondLook) -> Spots:
-    """A disc near each place, NaN where there is none; by its own light of a marker that is none by that of all."""
+    """A disc near each place, NaN where there is none; a marker that is hardly found may get its own contrast."""
     name = views.names[k]
     pulses = np.array([window.candidates[t].pulse for t in places.step])
     discs = look.fit_discs(pulses.tolist(), name, places.xy, shape)
@@ -169,7 +168,7 @@ def _fitted(views: Views, window: Window, k: int, places: _Places, shape: DiscSh
 
 
 def _itself(places: _Places, discs: Spots) -> Flags:
-    """Whether what is at each place (n,) is a disc, not one beside it."""
+    """Whether each place (n,) itself shows a disc, not a thing beside it."""
     away = np.linalg.norm(discs.xy - places.xy, axis=1)
     return np.asarray(np.nan_to_num(away, nan=np.inf) < _ITSELF * places.radius)
 
@@ -182,7 +181,7 @@ def _with(discs: Spots, chosen: Integers, others: Spots) -> Spots:
 
 
 def _only(markers: Markers, worn: Flags) -> Markers:
-    """The markers without the names of those (4,) that are not worn; where these would be, nobody knows."""
+    """The markers without the names of those that are not worn (4,); their predicted places become unknown."""
     rays, xyz = markers.assigned.rays.copy(), markers.assigned.xyz.copy()
     rays[:, ~worn], xyz[:, ~worn] = -1, np.nan
     covariance = markers.predicted.covariance.copy()
@@ -192,7 +191,7 @@ def _only(markers: Markers, worn: Flags) -> Markers:
 
 
 def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sights: Sequence[Sight]) -> list[float]:
-    """Radius of the markers, m, as each camera shows it: the median of the spots of a marker that is in full view."""
+    """Radius of the markers, m, in each camera: the median over the spots of a marker in full view."""
     found: list[tuple[Floats, Floats, Integers]] = []
     for k, (name, sight) in enumerate(zip(views.names, sights, strict=True)):
         steps, which = np.nonzero(markers.assigned.rays[..., k] >= 0)
@@ -214,8 +213,8 @@ def _radii(views: Views, window: Window, flight: Flight, markers: Markers, sight
 def radius_in_full_view(radius: Floats, contrast: Floats, which: Integers) -> float:
     """Radius of the markers out of those of n spots, their contrasts and their markers.
 
-    What covers a marker makes its spots smaller and fainter, perhaps in most pulses, and what is alike beside one makes
-    them larger. So it is the second largest of the medians of those markers that are about as bright as the brightest.
+    A covered marker has smaller and fainter spots, perhaps in most pulses; one beside a thing of its own grey value has
+    larger ones. So the result is the second largest median of those markers that are nearly as bright as the brightest.
     """
     own = [which == i for i in range(len(POINTS)) if np.count_nonzero(which == i) >= _FEW]
     if not own:

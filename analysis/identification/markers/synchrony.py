@@ -1,4 +1,4 @@
-"""Which camera shows the jumper later or earlier than the others: so that its spots are named too, and can prove it.
+"""Which camera shows the jumper later or earlier than the others, so that its spots can be named too.
 
 A camera that is late by some milliseconds sees the jumper where no ray of the others meets its rays. It is found by the
 time at which its spots lie on the path that the others saw. This is a start for identification only; the offset itself
@@ -18,11 +18,11 @@ from analysis.identification.space.views import Views
 from rig.arrays import Flags, Floats, Integers
 
 _LEAST_CAMERAS = 3  #: two cameras cannot tell which of them is late
-_AGREES = 0.5  #: share of the expected markers that a camera shows, or of the threefold ones, if all are on time
-_BY_CHANCE_P = 1e-6  #: that other spots make as many markers at a time that is not the right one
-_APART_M = 0.3  #: of two times: so far behind the right place none of a marker's own spots counts
-_NEAR_M = 0.06  #: so near to the path is a marker on it: the others may differ a little among themselves
-_AGREE_M = 0.03  #: so far may the jumper have moved for three rays still to meet
+_AGREES = 0.5  #: least share of the expected markers that a camera shows while all cameras are on time
+_BY_CHANCE_P = 1e-6  #: of so many markers at a wrong time by chance
+_APART_M = 0.3  #: the jumper's way between two times, beyond which the marker's own spots no longer count
+_NEAR_M = 0.06  #: a marker so near to the path is on it: the other cameras may differ a little too
+_AGREE_M = 0.03  #: the jumper's way during an offset at which three rays still meet
 _COARSE = 3  #: steps of the time that are taken at once at first
 _FEW_PULSES, _MANY_PULSES = 8, 32  #: that are tried with other times, at first and in the end
 _PLACES: Final = 4  #: cameras and times that are tried in more pulses
@@ -40,7 +40,7 @@ def lateness(views: Views, window: Window, markers: Markers, flight: Flight) -> 
 
 
 def _off_path(views: Views, window: Window, markers: Markers, flight: Flight) -> Floats:
-    """Cameras that show the jumper at another time on the path that the others saw."""
+    """Offsets of cameras whose spots lie elsewhere in time on the path that the other cameras saw."""
     late = np.zeros(len(views))
     known = well_known(markers.predicted.covariance)
     greatest = max(_MOST_S, _MOST_PULSES * float(np.median(np.diff(window.time_s))))
@@ -58,7 +58,7 @@ def _off_path(views: Views, window: Window, markers: Markers, flight: Flight) ->
         if not wrong.any():  # he is too slow for times to differ
             continue
         chance = float(counts[wrong].mean())
-        # A marker that the others show less often than not is no more often to be seen in this camera.
+        # This camera will not show markers more often than the others do.
         usual = float(np.median(np.delete(shown, k)))
         enough = max(_AGREES * usual * float(count[k]), 2.0 * counts[-1])
         if counts[best] > enough and pdtrc(counts[best] - 1, chance) < _BY_CHANCE_P:

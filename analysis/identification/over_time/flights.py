@@ -249,7 +249,7 @@ def _following(
     off -= ratio[:, None] * (here.xyz[i[step]] - arrivals.xyz[came])
     traces = [np.trace(of, axis1=1, axis2=2) for of in (there.covariance, here.covariance, arrivals.covariance)]
     most = traces[0][j[step]] + (1 + ratio) ** 2 * traces[1][i[step]] + ratio**2 * traces[2][came] + 3 * bend
-    # no variance is larger than the trace: for most pairs that is enough to tell that they do not fit
+    # no variance is larger than the trace: by this bound most pairs are refused already
     near = np.flatnonzero((off**2).sum(axis=1) < _FITS * most)
     step, came, off, ratio, bend = step[near], came[near], off[near], ratio[near, None, None], bend[near, None, None]
     covariance = (

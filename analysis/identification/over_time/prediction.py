@@ -1,9 +1,9 @@
-"""What is to be expected at a pulse by what was measured before and after it, not at it: two Kalman filters that meet.
+"""Predicts values at a pulse from measurements before and after it, not at it: two Kalman filters that meet.
 
 Places of markers and angles of skis move alike: their second derivative changes as a random walk (white jerk). The
 strength of the walk is that of a jumper's strongest movements: the prediction is a gate and pulls no measurement. What
 moves stiffly together is described by its parts: both bindings by their midpoint and by half the way between them, so
-that the one that is hidden is where the other one tells.
+that the visible binding predicts the hidden one.
 """
 
 from collections.abc import Sequence
@@ -59,7 +59,7 @@ def predict(time_s: Floats, xyz: Floats, covariance: Floats, parts: Sequence[Par
     filters = PathFilter(xyz.shape[2], parts, mixing)
     ahead, back = filters.run(time_s, xyz, covariance)
     steps, n, d = xyz.shape
-    # both filters together, of what is asked for alone: ahead gives way to back by its share of both variances
+    # the weighted mean of both filters, for the wanted things only: the weight of `back` is its share of the variances
     asked = filters.all_of @ ahead[1]
     share = np.linalg.solve(ahead[1] + back[1], asked.swapaxes(-1, -2)).swapaxes(-1, -2)
     values = ahead[0] @ filters.all_of.T + (share @ (back[0] - ahead[0])[..., None])[..., 0]

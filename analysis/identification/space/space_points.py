@@ -19,7 +19,7 @@ from rig.arrays import Flags, Floats, Integers
 _LIGHT = 0.25  #: standard deviation of a marker's contrast, share of it: light, background and direction change it
 _SIZE = 0.35  #: standard deviation of the logarithm of a spot's radius
 _DOUBTFUL = 0.95  #: share of true points that fit better than one that may have a wrong ray
-_ODDEST = 30.0  #: the greatest chi-square: five standard deviations may have a reason that nobody thought of
+_ODDEST = 30.0  #: the greatest chi-square: beyond five standard deviations the model of errors no longer holds
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,8 +177,8 @@ def find_space_points(views: Views, pulses: Sequence[Sequence[Rays]]) -> list[Sp
 def _without_one(points: Integers, misfit: Floats) -> Integers:
     """Points (n, 1 + m), pulse and rays, of three rays or more, without a ray that may be wrong.
 
-    The marker may be hidden in one of the images, and what hides it may show a spot near its place. So rays are left
-    out whose spot another point of as many rays has too, and of points that fit badly each one in turn.
+    Where a marker is hidden in an image, the thing before it may show a spot near its place. So a ray is left out if
+    another point with as many rays has its spot too; and of points that fit badly, each ray in turn.
 
     Args:
         points: with all their rays.

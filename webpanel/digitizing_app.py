@@ -6,17 +6,17 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 from fastapi.responses import RedirectResponse
+from starlette.datastructures import State
 
 from analysis.digitizing.desks import Desks
 from webpanel.door.access import Access
 from webpanel.door.guard import Guard
 from webpanel.door.logins import Door
-from webpanel.door.streams import OpenStreams
+from webpanel.door.streams import OpenStreams, Threads
 from webpanel.page_files import serve_page
 from webpanel.problems import handle_errors
+from webpanel.routes import digitizing, login
 from webpanel.routes.common import add_routers
-from webpanel.routes.digitizing import digitizing_router
-from webpanel.routes.login import login_router
 
 
 def create_digitizing_app(desks: Desks, access: Access, page: str) -> FastAPI:
@@ -36,16 +36,15 @@ def create_digitizing_app(desks: Desks, access: Access, page: str) -> FastAPI:
         title="Svev: measuring by hand", version=version("svev"), docs_url=None, redoc_url=None, redirect_slashes=False,
         lifespan=lifespan,
     )  # fmt: skip
-    streams = app.state.streams = OpenStreams()
 
     def unheard(*_: object) -> None:
         """Who measures sees on the page what he did."""
 
     door = Door(access, unheard)
-    routers = digitizing_router(desks, streams.events), login_router(door, unheard)
-    handle_errors(app, add_routers(app, routers))
+    app.state = State({"door": door, "desks": desks, "streams": OpenStreams(), "threads": Threads()})
+    handle_errors(app, add_routers(app, (digitizing.router, login.router)))
     serve_page(app)
-    app.add_middleware(Guard, door=door, note=unheard, visit=unheard)
+    app.add_middleware(Guard, door=door, visit=unheard)
 
     @app.get("/", include_in_schema=False)
     def lead() -> RedirectResponse:

@@ -47,7 +47,8 @@ def schemathesis(url: str, folder: Path, *options: str) -> str:
 def test_the_api_is_as_it_is_described(
     panel: Panel, service: MemoryService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("webpanel.routes.preview._WAIT_S", 0.01)  # a disarmed rig has no picture to wait for
+    for module in ("webpanel.previews", "webpanel.routes.preview"):
+        monkeypatch.setattr(f"{module}.WAIT_S", 0.01)  # a disarmed rig has no picture to wait for
     for number in range(3):
         write_recording(service.catalogue.directory, f"jump-{number}", (ALL_OK, K2_LOST, ALL_OK))
     service.arm()

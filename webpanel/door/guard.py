@@ -16,7 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from rig.api.digitizing import MARKS_BYTES_MAX
 from rig.api.looking import VOICE_BYTES_MAX
 from rig.api.start_list import TABLE_BYTES_MAX
-from rig.phrase import Phrase, phrase
+from rig.phrase import phrase
 from webpanel.door.access import Access
 from webpanel.door.logins import Caller, Door, check_role
 from webpanel.door.roles import READING, act
@@ -71,17 +71,13 @@ class Guard:
     Args:
         app: what it guards.
         door: decides who gets in.
-        note: told who has changed what, in one line.
         visit: asked, with recording and path, for each call of somebody who has a link; raises ProblemError if what he
             asks for is not to be had now.
     """
 
-    def __init__(
-        self, app: ASGIApp, door: Door, note: Callable[[Phrase], None], visit: Callable[[str, str], None]
-    ) -> None:
+    def __init__(self, app: ASGIApp, door: Door, visit: Callable[[str, str], None]) -> None:
         self._app = app
         self._door = door
-        self._note = note
         self._visit = visit
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -104,7 +100,7 @@ class Guard:
                 done = act(scope["method"], scope["path"]) if changed and caller is not None else None
                 if done is not None:
                     said = phrase("event_act", "{act} ({caller})", act=done, caller=str(caller))
-                    await run_in_threadpool(self._note, said)
+                    await run_in_threadpool(self._door.tell, "info", said)
             await send(message)
 
         try:

@@ -8,7 +8,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from http import HTTPStatus
-from typing import Final
+from typing import Final, Literal
 
 from starlette.requests import HTTPConnection
 
@@ -128,12 +128,12 @@ class Door:
 
     Attributes:
         access: the rules.
-        warn: told of clients that send wrong tokens.
+        tell: takes events with their levels: logins and logouts, changes and who made them, wrong tokens.
         links: makes and checks links to single recordings; None: there are none.
     """
 
     access: Access
-    warn: Callable[[Phrase], None]
+    tell: Callable[[Literal["info", "warning"], Phrase], None]
     links: Links | None = None
     sessions: Sessions = field(default_factory=Sessions)
     brake: Brake = field(default_factory=Brake)
@@ -157,10 +157,10 @@ class Door:
             raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, "too_many_wrong_tokens", text, headers)
         count = self.brake.wrong(site, candidate)
         if count == 1:
-            self.warn(phrase("event_wrong_token", "wrong token from {client}", client=client))
+            self.tell("warning", phrase("event_wrong_token", "wrong token from {client}", client=client))
         elif count == _GUESSES_MAX:
             text = "{count} wrong tokens from {client} within a minute: somebody guesses; its tries are slowed down"
-            self.warn(phrase("event_guessing", text, count=count, client=client))
+            self.tell("warning", phrase("event_guessing", text, count=count, client=client))
         raise _unauthorized("wrong_token", "the token is wrong: take the one that the service was started with")
 
     def admit(self, request: HTTPConnection) -> Caller:

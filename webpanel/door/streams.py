@@ -1,9 +1,12 @@
-"""Limits the number of long answers (streams, waits for a picture, downloads); ends the endless ones at shutdown."""
+"""Limits long answers (streams, waits for a picture, downloads) and threads of slow work; ends endless answers."""
 
 import asyncio
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from http import HTTPStatus
+
+from anyio import CapacityLimiter
 
 from webpanel.problems import ProblemError
 
@@ -42,8 +45,9 @@ class Streams:
             return False
         return True
 
+    @asynccontextmanager
     async def place(self) -> AsyncIterator[None]:
-        """Count a stream as open while it lasts; a dependency of routes, `Depends(streams.place)`.
+        """Count a stream as open while it lasts.
 
         Raises:
             ProblemError: 503, the largest number are open.
@@ -72,3 +76,22 @@ class OpenStreams:
         self.events.end()
         self.previews.end()
         self.downloads.end()
+
+
+@dataclass(frozen=True, slots=True)
+class Threads:
+    """Threads for slow work: its callers must not take all of them from those who want to stop a recording.
+
+    Attributes:
+        doctor: examine the rig, some seconds each.
+        reading: read and encode images of recordings.
+        summing: read whole logs for their checksums.
+        aiming: wait for pictures of single cameras, for those who set them up.
+        waiting: wait for changes of what is measured by hand: those of so many pages.
+    """
+
+    doctor: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(1))
+    reading: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(2))
+    summing: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(1))
+    aiming: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(4))
+    waiting: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(32))

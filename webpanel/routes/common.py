@@ -130,6 +130,11 @@ class StrictRoute(APIRoute):
         self.methods = set(more["methods"])
         self.path_regex, self.path_format, self.param_convertors = compile_path(path)
 
+    def again(self) -> "StrictRoute":
+        """Another such route, not made yet; of one that was not made."""
+        path, endpoint, more = self._unmade
+        return StrictRoute(path, endpoint, **more)
+
     def __getattr__(self, name: str) -> Any:
         """Make the rest of the route, of which `name` is a part."""
         unmade = self.__dict__.pop("_unmade", None)
@@ -170,13 +175,15 @@ def strict_router(tag: str, prefix: str = "/api") -> APIRouter:
 
 
 def add_routers(app: FastAPI, routers: Iterable[APIRouter]) -> list[APIRoute]:
-    """Give the routes of routers to an application; they are complete as they are.
+    """Give an application routes of its own like those of routers, whose paths are complete.
 
-    `app.include_router` would make each of them once more, at the first request: that takes as long as the first time.
+    `app.include_router` would make each of them at once.
 
     Returns:
         The routes.
     """
-    routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
+    routes: list[APIRoute] = [
+        route.again() for router in routers for route in router.routes if isinstance(route, StrictRoute)
+    ]
     app.router.routes.extend(routes)
     return routes

@@ -15,7 +15,7 @@ from urllib.parse import quote, unquote
 
 import anyio
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import Query, Request, Response
 from fastapi.responses import FileResponse, PlainTextResponse, StreamingResponse
 from starlette.datastructures import Headers
 from starlette.types import Receive, Scope, Send
@@ -25,6 +25,7 @@ from service.seam.rig import RigService
 from webpanel.door.streams import Streams
 from webpanel.problems import problem
 from webpanel.routes.common import RecordingId, Responses, refusals, strict_router
+from webpanel.routes.dependencies import A_DOWNLOAD, Service, TheStreams, TheThreads
 
 _BINARY: Final = {"schema": {"type": "string", "format": "binary"}}
 _LOG: Final = {"application/octet-stream": _BINARY}
@@ -55,8 +56,6 @@ Ids = Annotated[
         examples=["jump-1,jump-2"],
     ),
 ]
-#: Checksums read whole logs: one at a time, so that they never slow down recording.
-_SUMMERS: Final = 1
 #: So often the work for a client looks whether it is still there, s.
 _LOOK_S: Final = 0.2
 #: Letters without an accent that could be taken off.
@@ -83,85 +82,6 @@ async def _still_wanted(request: Request, downloads: Streams) -> AsyncIterator[C
     finally:
         over.set()
         watching.cancel()
-
-
-def files_router(service: RigService, downloads: Streams) -> APIRouter:
-    """The routes that hand out recordings as files."""
-    router = strict_router("Recordings")
-    summers = anyio.CapacityLimiter(_SUMMERS)
-
-    def answer(recording_id: RecordingId) -> RecordingFile:
-        download = service.download(recording_id)
-        return RecordingFile(download, service.known_checksum(download))
-
-    @router.get(
-        "/recordings/{recording_id}/file",
-        response_class=FileResponse,
-        dependencies=[Depends(downloads.place)],
-        responses=_FILE | refusals(404, 409, 416, 503),
-    )
-    def download_recording(recording_id: RecordingId) -> RecordingFile:
-        """The log as a file, with the session as it was corrected: only its metadata differ from the recorded log.
-
-        Whole or by a `Range`; with `ETag` and `If-Range`, so that a download can be resumed. The header
-        `X-Svev-Session` says whether the session is `corrected` or `as-recorded`.
-        """
-        return answer(recording_id)
-
-    @router.head("/recordings/{recording_id}/file", include_in_schema=False)
-    def head_recording(recording_id: RecordingId) -> RecordingFile:
-        return answer(recording_id)
-
-    @router.get(
-        "/recordings/{recording_id}/file.sha256",
-        response_class=PlainTextResponse,
-        dependencies=[Depends(downloads.place)],
-        responses=_SUM | refusals(404, 409, 503),
-    )
-    async def get_checksum(recording_id: RecordingId, request: Request) -> PlainTextResponse:
-        """SHA-256 of the file as it is handed out, corrected session and all.
-
-        The first call reads the whole log; from then on the file carries it as `Repr-Digest` (RFC 9530).
-        """
-        async with _still_wanted(request, downloads) as wanted:
-            checksum = await run_sync(service.checksum, recording_id, wanted, limiter=summers)
-        name = (await run_sync(service.download, recording_id)).name
-        return PlainTextResponse(f"{checksum}  {name}\n")
-
-    @router.get(
-        "/recordings.zip",
-        response_class=StreamingResponse,
-        dependencies=[Depends(downloads.place)],
-        responses=_ZIP | refusals(404, 409, 503),
-    )
-    def download_together(ids: Ids) -> StreamingResponse:
-        """Several recordings as one ZIP archive without compression; `SHA256SUMS` in it has their checksums."""
-        size, pieces = service.zipped(_split(ids))
-        return StreamingResponse(pieces, media_type="application/zip", headers=_zip_headers(ids, size))
-
-    @router.head("/recordings.zip", include_in_schema=False)
-    def head_together(ids: Ids) -> Response:
-        size, _ = service.zipped(_split(ids))
-        return Response(media_type="application/zip", headers=_zip_headers(ids, size))
-
-    return router
-
-
-def _split(ids: str) -> list[str]:
-    return [unquote(each) for each in ids.split(",")]
-
-
-def _zip_headers(ids: str, size: int) -> dict[str, str]:
-    name = f"svev_{len(set(_split(ids)))}-jumps.zip"
-    return {"Content-Disposition": f'attachment; filename="{name}"', "Content-Length": str(size)}
-
-
-def attachment(name: str) -> str:
-    """The header that names a file; other letters than ASCII in the extended form (RFC 6266, 4.3)."""
-    apart = unicodedata.normalize("NFKD", name.translate(_PLAIN)).encode("ascii", "ignore").decode()
-    apart = apart.translate(_QUOTES)  # wide letters fall apart into them
-    extended = "" if apart == name else f"; filename*=UTF-8''{quote(name)}"
-    return f'attachment; filename="{apart}"{extended}'
 
 
 class RecordingFile(FileResponse):
@@ -210,6 +130,90 @@ class RecordingFile(FileResponse):
             if not spans or any(first > last for first, last in spans):
                 scope = {**scope, "headers": [pair for pair in scope["headers"] if pair[0] != b"range"]}
         await super().__call__(scope, receive, send)
+
+
+router = strict_router("Recordings")
+
+
+def _answer(service: RigService, recording_id: str) -> RecordingFile:
+    download = service.download(recording_id)
+    return RecordingFile(download, service.known_checksum(download))
+
+
+@router.get(
+    "/recordings/{recording_id}/file",
+    response_class=FileResponse,
+    dependencies=[A_DOWNLOAD],
+    responses=_FILE | refusals(404, 409, 416, 503),
+)
+def download_recording(service: Service, recording_id: RecordingId) -> RecordingFile:
+    """The log as a file, with the session as it was corrected: only its metadata differ from the recorded log.
+
+    Whole or by a `Range`; with `ETag` and `If-Range`, so that a download can be resumed. The header
+    `X-Svev-Session` says whether the session is `corrected` or `as-recorded`.
+    """
+    return _answer(service, recording_id)
+
+
+@router.head("/recordings/{recording_id}/file", include_in_schema=False)
+def head_recording(service: Service, recording_id: RecordingId) -> RecordingFile:
+    """The headers of the log as a file."""
+    return _answer(service, recording_id)
+
+
+@router.get(
+    "/recordings/{recording_id}/file.sha256",
+    response_class=PlainTextResponse,
+    dependencies=[A_DOWNLOAD],
+    responses=_SUM | refusals(404, 409, 503),
+)
+async def get_checksum(
+    service: Service, streams: TheStreams, threads: TheThreads, recording_id: RecordingId, request: Request
+) -> PlainTextResponse:
+    """SHA-256 of the file as it is handed out, corrected session and all.
+
+    The first call reads the whole log; from then on the file carries it as `Repr-Digest` (RFC 9530).
+    """
+    async with _still_wanted(request, streams.downloads) as wanted:
+        checksum = await run_sync(service.checksum, recording_id, wanted, limiter=threads.summing)
+    name = (await run_sync(service.download, recording_id)).name
+    return PlainTextResponse(f"{checksum}  {name}\n")
+
+
+@router.get(
+    "/recordings.zip",
+    response_class=StreamingResponse,
+    dependencies=[A_DOWNLOAD],
+    responses=_ZIP | refusals(404, 409, 503),
+)
+def download_together(service: Service, ids: Ids) -> StreamingResponse:
+    """Several recordings as one ZIP archive without compression; `SHA256SUMS` in it has their checksums."""
+    size, pieces = service.zipped(_split(ids))
+    return StreamingResponse(pieces, media_type="application/zip", headers=_zip_headers(ids, size))
+
+
+@router.head("/recordings.zip", include_in_schema=False)
+def head_together(service: Service, ids: Ids) -> Response:
+    """The headers of several recordings as one archive."""
+    size, _ = service.zipped(_split(ids))
+    return Response(media_type="application/zip", headers=_zip_headers(ids, size))
+
+
+def _split(ids: str) -> list[str]:
+    return [unquote(each) for each in ids.split(",")]
+
+
+def _zip_headers(ids: str, size: int) -> dict[str, str]:
+    name = f"svev_{len(set(_split(ids)))}-jumps.zip"
+    return {"Content-Disposition": f'attachment; filename="{name}"', "Content-Length": str(size)}
+
+
+def attachment(name: str) -> str:
+    """The header that names a file; other letters than ASCII in the extended form (RFC 6266, 4.3)."""
+    apart = unicodedata.normalize("NFKD", name.translate(_PLAIN)).encode("ascii", "ignore").decode()
+    apart = apart.translate(_QUOTES)  # wide letters fall apart into them
+    extended = "" if apart == name else f"; filename*=UTF-8''{quote(name)}"
+    return f'attachment; filename="{apart}"{extended}'
 
 
 def _spans(text: str, size: int) -> list[tuple[int, int]]:

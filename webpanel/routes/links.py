@@ -1,6 +1,5 @@
 """Routes of the link that opens one recording on an athlete's phone: its QR code, and what the phone sends back."""
 
-from collections.abc import Callable
 from datetime import UTC, datetime
 from http import HTTPStatus
 from ipaddress import ip_address
@@ -9,7 +8,7 @@ from urllib.parse import quote
 
 import cv2
 import numpy as np
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import Path, Request, Response
 from pydantic import Field
 
 from rig.api.fields import Model
@@ -18,9 +17,10 @@ from rig.host.file_names import ID_PATTERN
 from service.seam.rig import RigService
 from webpanel.door.access import Access, is_loopback
 from webpanel.door.links import KEY_LENGTH
-from webpanel.door.logins import LINK_COOKIE, Door
+from webpanel.door.logins import LINK_COOKIE
 from webpanel.problems import ProblemError
 from webpanel.routes.common import CHANGING, RecordingId, refusals, strict_router
+from webpanel.routes.dependencies import Service, TheDoor
 
 #: What JavaScript's encodeURIComponent leaves as it is, and `quote` does not: the page and the cookie write ids alike.
 _UNQUOTED: Final = "!'()"
@@ -60,97 +60,99 @@ class Visit(Model):
     ends: datetime = Field(description="when the link ends, UTC")
 
 
-def links_router(door: Door, service: RigService) -> APIRouter:
-    """The routes that make links to recordings, and open them."""
-    router = strict_router("Login")
+router = strict_router("Login")
 
-    @router.get("/recordings/{recording_id}/link", responses=refusals(404, 409))
-    def get_link(recording_id: RecordingId, request: Request) -> JumpLink:
-        """A link that opens this recording, and nothing else, on a phone without a token, and its QR code.
 
-        It shows the page of the jump with its pictures, figures and files, not the log and the notes, until `ends`
-        (`service.share_hours` of the rig file), while the recording is not in the trash, and while the tokens of the
-        service are the same. 409 if phones cannot reach the service.
-        """
-        if service.recording(recording_id).deleted:
-            text = "the jump lies in the trash: restore it, then show its code"
-            raise ProblemError(HTTPStatus.CONFLICT, "deleted_jump", text)
-        address = address_for_phones(request, door.access)
-        if door.links is None or address is None:
-            text = (
-                "phones cannot reach this service, so that a code would open nothing: start it with --host, a token "
-                "and --allow-host, and open this page by the address that phones use"
-            )
-            raise ProblemError(HTTPStatus.CONFLICT, "no_phones", text)
-        key, ends = door.links.make(recording_id)
-        link = f"{address}/#/jump/{quote(recording_id, safe=_UNQUOTED)}/{key}"
-        return JumpLink(link=link, ends=_utc(ends), code=qr_svg(link))
+@router.get("/recordings/{recording_id}/link", responses=refusals(404, 409))
+def get_link(service: Service, door: TheDoor, recording_id: RecordingId, request: Request) -> JumpLink:
+    """A link that opens this recording, and nothing else, on a phone without a token, and its QR code.
 
-    @router.get("/recordings/{recording_id}/links", responses=refusals(404))
-    def list_links(recording_id: RecordingId) -> list[OpenLink]:
-        """The links that open this recording, the oldest first. A code that is shown again soon is the same link."""
-        service.recording(recording_id)
-        found = [] if door.links is None else door.links.open_links(recording_id)
-        return [OpenLink(number=each.minute, made=_utc(each.made), ends=_utc(60.0 * each.minute)) for each in found]
+    It shows the page of the jump with its pictures, figures and files, not the log and the notes, until `ends`
+    (`service.share_hours` of the rig file), while the recording is not in the trash, and while the tokens of the
+    service are the same. 409 if phones cannot reach the service.
+    """
+    if service.recording(recording_id).deleted:
+        text = "the jump lies in the trash: restore it, then show its code"
+        raise ProblemError(HTTPStatus.CONFLICT, "deleted_jump", text)
+    address = address_for_phones(request, door.access)
+    if door.links is None or address is None:
+        text = (
+            "phones cannot reach this service, so that a code would open nothing: start it with --host, a token "
+            "and --allow-host, and open this page by the address that phones use"
+        )
+        raise ProblemError(HTTPStatus.CONFLICT, "no_phones", text)
+    key, ends = door.links.make(recording_id)
+    link = f"{address}/#/jump/{quote(recording_id, safe=_UNQUOTED)}/{key}"
+    return JumpLink(link=link, ends=_utc(ends), code=qr_svg(link))
 
-    @router.delete(
-        "/recordings/{recording_id}/links/{number}",
-        status_code=HTTPStatus.NO_CONTENT,
-        responses=CHANGING | refusals(404, 503),
-    )
-    def take_link_back(
-        recording_id: RecordingId, number: Annotated[int, Path(ge=0, lt=1 << 32, description="`number` of the link")]
-    ) -> None:
-        """Let a link open nothing any more, also where it is open now. The next code of the recording is another one.
 
-        503: it is taken back, but the disk refuses to keep that, so that a restart of the service would open it again.
-        """
-        service.recording(recording_id)
-        kept = None if door.links is None else door.links.take_back(recording_id, number)
-        if kept is None:
-            text = "there is no such link, or it opens nothing any more: look at the list again"
-            raise ProblemError(HTTPStatus.NOT_FOUND, "unknown_link", text)
-        if not kept:
-            text = "the link is taken back until the service is restarted, no longer: its disk refuses; make room on it"
-            raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "link_not_kept", text)
+@router.get("/recordings/{recording_id}/links", responses=refusals(404))
+def list_links(service: Service, door: TheDoor, recording_id: RecordingId) -> list[OpenLink]:
+    """The links that open this recording, the oldest first. A code that is shown again soon is the same link."""
+    service.recording(recording_id)
+    found = [] if door.links is None else door.links.open_links(recording_id)
+    return [OpenLink(number=each.minute, made=_utc(each.made), ends=_utc(60.0 * each.minute)) for each in found]
 
-    @router.post("/login/link", responses=refusals(413, 415))
-    def log_in_by_link(request: Request, response: Response, given: LinkLogin) -> Visit:
-        """Give the key of a link, get a cookie that opens the recording of the link until it ends."""
-        ends, left_s = door.check_link(given.recording, given.key)
-        response.set_cookie(
-            LINK_COOKIE, given.key, max_age=int(left_s), httponly=True, samesite="strict",
-            path=f"/api/recordings/{quote(given.recording, safe=_UNQUOTED)}", secure=door.access.is_https(request),
-        )  # fmt: skip
-        return Visit(recording=given.recording, ends=_utc(ends))
 
-    return router
+@router.delete(
+    "/recordings/{recording_id}/links/{number}",
+    status_code=HTTPStatus.NO_CONTENT,
+    responses=CHANGING | refusals(404, 503),
+)
+def take_link_back(
+    service: Service,
+    door: TheDoor,
+    recording_id: RecordingId,
+    number: Annotated[int, Path(ge=0, lt=1 << 32, description="`number` of the link")],
+) -> None:
+    """Let a link open nothing any more, also where it is open now. The next code of the recording is another one.
+
+    503: it is taken back, but the disk refuses to keep that, so that a restart of the service would open it again.
+    """
+    service.recording(recording_id)
+    kept = None if door.links is None else door.links.take_back(recording_id, number)
+    if kept is None:
+        text = "there is no such link, or it opens nothing any more: look at the list again"
+        raise ProblemError(HTTPStatus.NOT_FOUND, "unknown_link", text)
+    if not kept:
+        text = "the link is taken back until the service is restarted, no longer: its disk refuses; make room on it"
+        raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "link_not_kept", text)
+
+
+@router.post("/login/link", responses=refusals(413, 415))
+def log_in_by_link(door: TheDoor, request: Request, response: Response, given: LinkLogin) -> Visit:
+    """Give the key of a link, get a cookie that opens the recording of the link until it ends."""
+    ends, left_s = door.check_link(given.recording, given.key)
+    response.set_cookie(
+        LINK_COOKIE, given.key, max_age=int(left_s), httponly=True, samesite="strict",
+        path=f"/api/recordings/{quote(given.recording, safe=_UNQUOTED)}", secure=door.access.is_https(request),
+    )  # fmt: skip
+    return Visit(recording=given.recording, ends=_utc(ends))
 
 
 def _utc(time_s: float) -> datetime:
     return datetime.fromtimestamp(time_s, UTC)
 
 
-def visiting(service: RigService) -> Callable[[str, str], None]:
-    """What is asked for each call of somebody who has a link: the recording, and the path.
+def check_visit(service: RigService, recording: str, path: str) -> None:
+    """Check a call of somebody who has a link to a recording.
 
     A recording in the trash is shown to nobody; and the phones of a whole team read nothing large from the disk while
     a recording runs, which comes first.
+
+    Raises:
+        ProblemError: 404 it lies in the trash, 503 a recording runs.
     """
-
-    def visit(recording: str, path: str) -> None:
-        try:
-            deleted = service.recording(recording).deleted
-        except UnknownRecordingError:
-            deleted = True
-        if deleted:
-            raise ProblemError(HTTPStatus.NOT_FOUND, "unknown_recording", "this jump was deleted: ask the coach")
-        own = f"/api/recordings/{recording}"
-        if path not in {own, f"{own}/measurement"} and service.status().recording is not None:
-            text = "pictures and files wait while a recording runs: they come when it has ended"
-            raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "recording_runs", text, {"Retry-After": str(_AGAIN_S)})
-
-    return visit
+    try:
+        deleted = service.recording(recording).deleted
+    except UnknownRecordingError:
+        deleted = True
+    if deleted:
+        raise ProblemError(HTTPStatus.NOT_FOUND, "unknown_recording", "this jump was deleted: ask the coach")
+    own = f"/api/recordings/{recording}"
+    if path not in {own, f"{own}/measurement"} and service.status().recording is not None:
+        text = "pictures and files wait while a recording runs: they come when it has ended"
+        raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, "recording_runs", text, {"Retry-After": str(_AGAIN_S)})
 
 
 def address_for_phones(request: Request, access: Access) -> str | None:

@@ -3,14 +3,13 @@
 from http import HTTPStatus
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Path, Query, Request
+from fastapi import Path, Query, Request
 from fastapi.responses import FileResponse
 
 from rig.api.measuring import Measurement
-from service.seam.rig import RigService
 from webpanel.door.roles import shown_by_link
-from webpanel.door.streams import Streams
 from webpanel.routes.common import ALONE, CHANGING, NoFields, RecordingId, Responses, refusals, strict_router
+from webpanel.routes.dependencies import A_DOWNLOAD, Service
 from webpanel.routes.files import attachment
 
 FileName = Annotated[
@@ -33,52 +32,53 @@ _SHOWN: Final = {
     ".mp4": "video/mp4",
 }
 
+router = strict_router("Measurements")
 
-def measuring_router(service: RigService, downloads: Streams) -> APIRouter:
-    """The routes about what was measured in a recording."""
-    router = strict_router("Measurements")
 
-    @router.get("/recordings/{recording_id}/measurement", responses=refusals(404, 409))
-    def get_measurement(recording_id: RecordingId, request: Request, jumps: WithJumps = True) -> Measurement:
-        """What is known of the jumps of a recording, and how far its measuring is.
+@router.get("/recordings/{recording_id}/measurement", responses=refusals(404, 409))
+def get_measurement(
+    service: Service, recording_id: RecordingId, request: Request, jumps: WithJumps = True
+) -> Measurement:
+    """What is known of the jumps of a recording, and how far its measuring is.
 
-        The log of every recording is measured by itself after its end, if the rig file has `[analysis]`; until then the
-        figures are those that were measured live (`live`), and `jumps` is empty. Progress is in `measuring` of
-        `GET /status` and its events.
-        """
-        found, caller = service.measurement(recording_id, jumps=jumps), request.state.caller
-        own = f"/api/recordings/{recording_id}/measurement/files"
-        files = [
-            name for name in found.files if not caller.recording or shown_by_link("GET", f"{own}/{name}", recording_id)
-        ]
-        return found.model_copy(update={"files": tuple(files)})
+    The log of every recording is measured by itself after its end, if the rig file has `[analysis]`; until then the
+    figures are those that were measured live (`live`), and `jumps` is empty. Progress is in `measuring` of
+    `GET /status` and its events.
+    """
+    found, caller = service.measurement(recording_id, jumps=jumps), request.state.caller
+    own = f"/api/recordings/{recording_id}/measurement/files"
+    files = [
+        name for name in found.files if not caller.recording or shown_by_link("GET", f"{own}/{name}", recording_id)
+    ]
+    return found.model_copy(update={"files": tuple(files)})
 
-    @router.post(
-        "/recordings/{recording_id}/measurement", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404)
-    )
-    def measure(recording_id: RecordingId, _: NoFields = None) -> Measurement:
-        """Have a recording measured, or measured again. It waits for those before it, and while a recording runs."""
-        return service.measure(recording_id)
 
-    @router.delete("/recordings/{recording_id}/measurement", responses=CHANGING | refusals(404))
-    def give_up_measuring(recording_id: RecordingId) -> Measurement:
-        """Do not measure a recording that waits for it, or is being measured; an earlier result stays."""
-        return service.give_up_measuring(recording_id)
+@router.post(
+    "/recordings/{recording_id}/measurement", status_code=HTTPStatus.ACCEPTED, responses=CHANGING | refusals(404)
+)
+def measure(service: Service, recording_id: RecordingId, _: NoFields = None) -> Measurement:
+    """Have a recording measured, or measured again. It waits for those before it, and while a recording runs."""
+    return service.measure(recording_id)
 
-    @router.get(
-        "/recordings/{recording_id}/measurement/files/{name}",
-        response_class=FileResponse,
-        dependencies=[Depends(downloads.place)],
-        responses=_FILE | refusals(404, 409, 503),
-    )
-    def get_measured_file(recording_id: RecordingId, name: FileName) -> FileResponse:
-        """A file of the result: the coach's page `report.html`, tables, C3D, TRC, the protocol, the network.
 
-        Refused (409) for a moment after the session was corrected, where the file says whose jump it is.
-        """
-        file = service.measured_file(recording_id, name)
-        shown = _SHOWN.get(file.suffix)
-        offered = {} if shown else {"Content-Disposition": attachment(f"{recording_id}-{name}")}
-        return FileResponse(file, headers=ALONE | offered, media_type=shown or "application/octet-stream")
+@router.delete("/recordings/{recording_id}/measurement", responses=CHANGING | refusals(404))
+def give_up_measuring(service: Service, recording_id: RecordingId) -> Measurement:
+    """Do not measure a recording that waits for it, or is being measured; an earlier result stays."""
+    return service.give_up_measuring(recording_id)
 
-    return router
+
+@router.get(
+    "/recordings/{recording_id}/measurement/files/{name}",
+    response_class=FileResponse,
+    dependencies=[A_DOWNLOAD],
+    responses=_FILE | refusals(404, 409, 503),
+)
+def get_measured_file(service: Service, recording_id: RecordingId, name: FileName) -> FileResponse:
+    """A file of the result: the coach's page `report.html`, tables, C3D, TRC, the protocol, the network.
+
+    Refused (409) for a moment after the session was corrected, where the file says whose jump it is.
+    """
+    file = service.measured_file(recording_id, name)
+    shown = _SHOWN.get(file.suffix)
+    offered = {} if shown else {"Content-Disposition": attachment(f"{recording_id}-{name}")}
+    return FileResponse(file, headers=ALONE | offered, media_type=shown or "application/octet-stream")

@@ -1,23 +1,14 @@
 """The routes for monitoring programs: metrics in the text format of Prometheus or of OpenMetrics, and health."""
 
-from collections import Counter
-from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Header, Response
+from fastapi import Header, Response
 from fastapi.responses import PlainTextResponse
-from prometheus_client import CollectorRegistry
-from prometheus_client.exposition import choose_encoder
-from prometheus_client.metrics_core import CounterMetricFamily, Metric
-from prometheus_client.registry import Collector
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rig.api.fields import Model
-from service.seam.rig import RigService
 from webpanel.routes.common import Responses, strict_router
-
-_METHODS = frozenset({"GET", "HEAD", "POST", "PATCH", "DELETE", "PUT", "OPTIONS"})
+from webpanel.routes.dependencies import Service, TheMetrics
 
 
 class Health(Model):
@@ -29,68 +20,19 @@ class Health(Model):
 _UNWELL: Final[Responses] = {503: {"description": "The service is unwell.", "model": Health}}
 
 
-class Metrics(Collector):
-    """The service's metric families, fetched anew for each scrape, and the count of HTTP requests."""
-
-    def __init__(self, service: RigService) -> None:
-        self._service = service
-        self._requests: Counter[tuple[str, str]] = Counter()
-        self._registry = CollectorRegistry(auto_describe=False)
-        self._registry.register(self)
-
-    def collect(self) -> Iterator[Metric]:
-        """All metric families."""
-        yield from self._service.metrics()
-        requests = CounterMetricFamily(
-            "svev_http_requests", "Requests by method and status.", labels=("method", "status")
-        )
-        for values, count in sorted(self._requests.items()):
-            requests.add_metric(values, count)
-        yield requests
-
-    def text(self, accepted: str) -> tuple[bytes, str]:
-        """All metric families, and the media type of the format, chosen by an Accept header."""
-        encode, media_type = choose_encoder(accepted)
-        return encode(self._registry), media_type
-
-    def count(self, method: str, status: int) -> None:
-        """Count one request. Call it from the event loop only."""
-        self._requests[method if method in _METHODS else "other", str(status)] += 1
+router = strict_router("Observing", prefix="")
 
 
-class CountRequests:
-    """ASGI middleware: counts requests by method and status."""
-
-    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
-        self._app = app
-        self._metrics = metrics
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One request."""
-
-        async def send_counted(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                self._metrics.count(scope["method"], message["status"])
-            await send(message)
-
-        await self._app(scope, receive, send_counted if scope["type"] == "http" else send)
+@router.get("/metrics", response_class=PlainTextResponse)
+def get_metrics(metrics: TheMetrics, accept: Annotated[str, Header(include_in_schema=False)] = "") -> Response:
+    """What has been measured, for Prometheus; in the format of OpenMetrics for those that accept it."""
+    text, media_type = metrics.text(accept)
+    return Response(text, media_type=media_type, headers={"Vary": "Accept"})
 
 
-def observing_router(service: RigService, metrics: Metrics) -> APIRouter:
-    """The routes outside `/api`."""
-    router = strict_router("Observing", prefix="")
-
-    @router.get("/metrics", response_class=PlainTextResponse)
-    def get_metrics(accept: Annotated[str, Header(include_in_schema=False)] = "") -> Response:
-        """What has been measured, for Prometheus; in the format of OpenMetrics for those that accept it."""
-        text, media_type = metrics.text(accept)
-        return Response(text, media_type=media_type, headers={"Vary": "Accept"})
-
-    @router.get("/healthz", responses=_UNWELL)
-    def get_health(response: Response) -> Health:
-        """Whether the service itself works. Needs no token."""
-        healthy = service.healthy()
-        response.status_code = HTTPStatus.OK if healthy else HTTPStatus.SERVICE_UNAVAILABLE
-        return Health(healthy=healthy)
-
-    return router
+@router.get("/healthz", responses=_UNWELL)
+def get_health(service: Service, response: Response) -> Health:
+    """Whether the service itself works. Needs no token."""
+    healthy = service.healthy()
+    response.status_code = HTTPStatus.OK if healthy else HTTPStatus.SERVICE_UNAVAILABLE
+    return Health(healthy=healthy)

@@ -21,7 +21,7 @@ from tests.webpanel.memory_service import MemoryService, write_recording
 from tests.webpanel.serving import Panel, serving
 from webpanel.door.access import Access
 from webpanel.door.links import Links
-from webpanel.routes.preview import to_jpeg
+from webpanel.previews import to_jpeg
 
 TOKEN = "a-token-of-more-than-sixteen-characters"  # noqa: S105 - of this test alone
 #: A name that leads here (RFC 6761, 6.3) and that the service takes for a name in the network.

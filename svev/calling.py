@@ -1,14 +1,17 @@
 """What the commands of `svev ctl` share: options that may stand anywhere, calls of the service, answers shown."""
 
 import urllib.parse
-from collections.abc import Callable, Sequence
-from typing import Annotated, Any, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from typer.core import TyperGroup
 
 from svev import console
 from svev.rest_client import RestClient
+
+if TYPE_CHECKING:
+    from svev.answers import Kind
 
 #: Options of all commands together, each with a value.
 _EVERYWHERE: Final = ("--url", "--token-file")
@@ -49,12 +52,14 @@ def client_of(context: typer.Context) -> RestClient:
     return client
 
 
-def show(answer: Any, words: Callable[[Any], list[str]], as_json: bool) -> None:
-    """Print an answer as JSON, or as the lines that `words` makes of it."""
+def show(answer: Any, kind: "Kind", as_json: bool) -> None:
+    """Print an answer as JSON, or as lines for people."""
     if as_json:
         console.print_json(answer)
         return
-    for line in words(answer):
+    from svev.answers import lines_of  # noqa: PLC0415 - with the models of the API, which take 0.1 s
+
+    for line in lines_of(kind, answer):
         console.say(line)
 
 

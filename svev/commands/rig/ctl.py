@@ -10,14 +10,6 @@ import typer
 from rig.errors import BadInputError, CameraError, SvevError
 from rig.host.files import TEXT_MAX, read_whole
 from svev import console
-from svev.answers import (
-    jumper_lines,
-    measurement_lines,
-    recording_lines,
-    recordings_lines,
-    start_list_lines,
-    status_lines,
-)
 from svev.calling import AnywhereGroup, Json, call, client_of, path_of, show
 from svev.commands.rig.ctl_watching import doctor, log
 from svev.fetch import fetch
@@ -80,7 +72,7 @@ def status(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl status
     """
-    show(call(context, "GET", "/api/status"), status_lines, as_json)
+    show(call(context, "GET", "/api/status"), "status", as_json)
 
 
 @app.command()
@@ -98,7 +90,7 @@ def arm(
     Example: svev ctl arm
     """
     answer = call(context, "POST", "/api/arm", {"min_cameras": min_cameras})
-    show(_awaited(context, answer, "arming", wait_s), status_lines, as_json)
+    show(_awaited(context, answer, "arming", wait_s), "status", as_json)
 
 
 @app.command()
@@ -108,7 +100,7 @@ def disarm(context: typer.Context, wait_s: Wait = 60.0, as_json: Json = False) -
     Example: svev ctl disarm
     """
     answer = call(context, "POST", "/api/disarm")
-    show(_awaited(context, answer, "disarming", wait_s), status_lines, as_json)
+    show(_awaited(context, answer, "disarming", wait_s), "status", as_json)
 
 
 @app.command()
@@ -134,7 +126,7 @@ def start(
     """
     session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     order = session | _given(preroll_s=preroll, duration_s=seconds)
-    show(call(context, "POST", "/api/recordings", order), recording_lines, as_json)
+    show(call(context, "POST", "/api/recordings", order), "recording", as_json)
 
 
 @app.command(short_help="Have a recording measured, and show it.")
@@ -148,7 +140,7 @@ def measure(context: typer.Context, recording: Id, wait_s: Wait = 0.0, as_json: 
     while answer["state"] in {"waiting", "measuring"} and time.monotonic() < until:
         time.sleep(_POLL_S)
         answer = call(context, "GET", f"{path}?jumps=false")
-    show(answer, measurement_lines, as_json)
+    show(answer, "measurement", as_json)
 
 
 @app.command()
@@ -168,7 +160,7 @@ def stop(
         if current is None:
             raise SvevError("no recording is in progress: see svev ctl list")
         recording = current["id"]
-    show(call(context, "POST", f"{path_of(recording)}/stop"), recording_lines, as_json)
+    show(call(context, "POST", f"{path_of(recording)}/stop"), "recording", as_json)
 
 
 @app.command(short_help="Record what has just happened.")
@@ -192,7 +184,7 @@ def save(
     session = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     order = session | _given(preroll_s=seconds, duration_s=0)
     recording = call(context, "POST", "/api/recordings", order)
-    show(call(context, "POST", f"{path_of(recording['id'])}/stop"), recording_lines, as_json)
+    show(call(context, "POST", f"{path_of(recording['id'])}/stop"), "recording", as_json)
 
 
 @app.command("list")
@@ -210,7 +202,13 @@ def list_(
     """
     wanted = urllib.parse.urlencode({"deleted": str(deleted).lower(), "search": search})
     found = call(context, "GET", f"/api/recordings?{wanted}")
-    show({"recordings": found}, recordings_lines, as_json)
+    if as_json:
+        console.print_json({"recordings": found})
+        return
+    for recording in found:
+        show(recording, "recording", as_json=False)
+    if not found:
+        console.say("no recordings")
 
 
 @app.command(short_help="Change session fields of a recording.")
@@ -230,7 +228,7 @@ def session(
     Example: svev ctl session 2026-02-14T10-15-30Z --bib 18
     """
     change = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
-    show(call(context, "PATCH", path_of(recording), change), recording_lines, as_json)
+    show(call(context, "PATCH", path_of(recording), change), "recording", as_json)
 
 
 @app.command("next", short_help="Show or change the next jumper.")
@@ -250,7 +248,7 @@ def next_(
     """
     change = _given(athlete=athlete, bib=bib, gate=gate, wind=wind, notes=notes, operator=operator)
     method, body = ("PATCH", change) if change else ("GET", None)
-    show(call(context, method, "/api/next-jumper", body), jumper_lines, as_json)
+    show(call(context, method, "/api/next-jumper", body), "next jumper", as_json)
 
 
 @app.command()
@@ -259,7 +257,7 @@ def skip(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl skip
     """
-    show(call(context, "POST", "/api/next-jumper/skip"), start_list_lines, as_json)
+    show(call(context, "POST", "/api/next-jumper/skip"), "start list", as_json)
 
 
 @start_list_app.command("show", short_help="Show who has jumped, is next, and waits.")
@@ -268,7 +266,7 @@ def show_start_list(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl startlist show
     """
-    show(call(context, "GET", "/api/start-list"), start_list_lines, as_json)
+    show(call(context, "GET", "/api/start-list"), "start list", as_json)
 
 
 @start_list_app.command("load", short_help="Replace the start list by a table.")
@@ -294,7 +292,7 @@ def load_start_list(
         raise BadInputError(f"{table}: cannot be read ({error.strerror}); correct the path") from None
     chosen = {name: value for name, value in (("encoding", encoding), ("sheet", sheet)) if value is not None}
     path = f"/api/start-list?{urllib.parse.urlencode(chosen)}" if chosen else "/api/start-list"
-    show(call(context, "PUT", path, content), start_list_lines, as_json)
+    show(call(context, "PUT", path, content), "start list", as_json)
 
 
 @start_list_app.command("undo", short_help="Take the last change back.")
@@ -303,7 +301,7 @@ def undo(context: typer.Context, as_json: Json = False) -> None:
 
     Example: svev ctl startlist undo
     """
-    show(call(context, "POST", "/api/start-list/undo"), start_list_lines, as_json)
+    show(call(context, "POST", "/api/start-list/undo"), "start list", as_json)
 
 
 @app.command()
@@ -312,7 +310,7 @@ def delete(context: typer.Context, recording: Id, as_json: Json = False) -> None
 
     Example: svev ctl delete 2026-02-14T10-15-30Z
     """
-    show(call(context, "DELETE", path_of(recording)), recording_lines, as_json)
+    show(call(context, "DELETE", path_of(recording)), "recording", as_json)
 
 
 @app.command()
@@ -321,7 +319,7 @@ def restore(context: typer.Context, recording: Id, as_json: Json = False) -> Non
 
     Example: svev ctl restore 2026-02-14T10-15-30Z
     """
-    show(call(context, "POST", f"{path_of(recording)}/restore"), recording_lines, as_json)
+    show(call(context, "POST", f"{path_of(recording)}/restore"), "recording", as_json)
 
 
 @app.command(short_help="Fetch files of recordings, and check them.")
@@ -351,7 +349,11 @@ def download(
                 client, f"{path_of(recording)}/file", folder, lambda have, of: advance(have * 100 // max(1, of))
             )
         found.append(str(path))
-    show({"files": found}, lambda answer: answer["files"], as_json)
+    if as_json:
+        console.print_json({"files": found})
+        return
+    for file in found:
+        console.say(file)
 
 
 @app.command(short_help="Say what lies in the trash, or empty it.")
@@ -369,11 +371,10 @@ def trash(
         raise BadInputError("--empty removes everything, --remove one recording: give one of the two")
     path = f"/api/trash/{urllib.parse.quote(remove, safe='')}" if remove else "/api/trash"
     answer = call(context, "DELETE" if empty or remove else "GET", path)
-    words = "removed for good" if empty or remove else "in the trash"
-    show(answer, lambda what: [f"{what['recordings']} recordings {words}, {what['bytes'] / 1e9:.2f} GB"], as_json)
+    show(answer, "removed" if empty or remove else "trash", as_json)
 
 
-def _awaited(context: typer.Context, answer: dict[str, Any], passing: str, wait_s: float) -> dict[str, Any]:
+def _awaited(context: typer.Context, answer: Any, passing: str, wait_s: float) -> Any:
     """Wait until the rig has left the state `passing`, and return the status then.
 
     Raises:

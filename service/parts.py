@@ -8,8 +8,8 @@ from typing import Final
 from rig.api.parts import PartsChange, PartsView
 from rig.events import Event, Level
 from rig.phrase import Phrase, phrase
+from rig.settings.editing import written_parts
 from rig.settings.model import RecorderSettings
-from rig.settings.parts import written_parts
 from service.rig_file import keep
 from service.supervision.messages import ChangeParts
 from service.supervision.supervisor import Supervisor

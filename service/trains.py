@@ -11,8 +11,8 @@ from rig.clocks import NS_PER_US
 from rig.errors import BadInputError, StateForbidsError
 from rig.events import TRIGGER, Event, Level
 from rig.phrase import Phrase, phrase
+from rig.settings.editing import with_rate, written_rate
 from rig.settings.model import RigSettings
-from rig.settings.rate import with_rate, written_rate
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.rig_file import keep

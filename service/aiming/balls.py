@@ -1,14 +1,29 @@
-"""Tells where the cameras should show the balls; reads the files again when they have changed."""
+"""Tells where the cameras should show the balls, by files, which it reads again when they have changed."""
 
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Final
 
 from rig.api.cameras.balls import CameraBalls
 from rig.settings.camera import CameraSettings
 from rig.settings.light import camera_of
 from rig.settings.model import RigSettings
-from service.aiming.files import ball_files
+
+#: In the folder of the recordings: where the cameras showed the balls when they were oriented last.
+ORIENTATION: Final = ".svev-orientation.json"
+
+
+def ball_files(rig: RigSettings, folder: Path) -> list[Path]:
+    """Last orientation, plan, survey and calibration, as far as the rig file names them; they need not be there.
+
+    Args:
+        rig: the rig.
+        folder: of the recordings.
+    """
+    analysis = rig.analysis
+    given = [] if analysis is None else [analysis.survey, analysis.calibration]
+    return [file for file in (folder / ORIENTATION, rig.plan, *given) if file is not None]
 
 
 class BallPlaces:

@@ -21,7 +21,7 @@ from rig.host.files import TEXT_MAX, read_whole
 from rig.phrase import phrase
 from rig.settings.camera import Region
 from rig.settings.model import RigSettings
-from service.aiming.files import ORIENTATION
+from service.aiming.balls import ORIENTATION
 from service.aiming.places import Balls, of_system
 
 

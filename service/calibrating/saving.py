@@ -8,7 +8,7 @@ from typing import Final
 from rig.events import Event, Level
 from rig.host.disk import replace_file
 from rig.phrase import Phrase, phrase
-from rig.settings.calibration import with_calibration, written_calibration
+from rig.settings.editing import with_calibration, written_calibration
 from service.rig_file import keep, read_calibration
 from service.supervision.messages import ChangeCalibration
 from service.supervision.situation import RigInUse

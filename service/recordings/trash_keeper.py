@@ -1,4 +1,4 @@
-"""Removes what is old from the trash, and what has been there for longest when the disk's room runs short."""
+"""Removes what is old from the trash, if the clock can be trusted, and the oldest when the disk's room runs short."""
 
 import threading
 import time
@@ -8,12 +8,13 @@ from typing import Final
 from recorder.catalogue.folder import Catalogue
 from recorder.catalogue.trash import TrashContents
 from rig.api.status import DiskStatus, Status
+from rig.clocks import NS_PER_S, UtcAnchor
 from rig.errors import StorageError
 from rig.events import Event, Level
 from rig.host.disk import free_bytes
+from rig.host.utc_clock import SetClock, is_synchronized
 from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
-from service.recordings.steady_clock import SteadyClock
 from service.recordings.storage import bytes_per_s, room_for, usable_bytes
 
 #: What was deleted is kept for so long, unless its room is needed.
@@ -32,6 +33,39 @@ _LAST_S: Final = 3 * _LOOK_S
 #: A disk that hangs is not waited for longer.
 _THREAD_ENDS_S: Final = 2.0
 _GB: Final = 1e9
+
+
+#: Programs that keep a clock right move it by less than 5 ms between two looks (500 ppm, adjtimex(2)); a step is more.
+_STEP_NS: Final = NS_PER_S
+#: For so long after a step, and after the service has begun to look, nothing is old.
+QUIET_S: Final = 3600.0
+
+
+class SteadyClock:
+    """Compares the clock with the time that the computer has been running; one thread asks at intervals.
+
+    Args:
+        utc_s: the clock, s.
+        running_s: time since the computer was started, s; nobody sets it.
+        synchronized: whether some program keeps the clock right.
+    """
+
+    def __init__(
+        self,
+        utc_s: Callable[[], float] = time.time,
+        running_s: Callable[[], float] = lambda: time.clock_gettime(time.CLOCK_BOOTTIME),
+        synchronized: Callable[[], bool] = is_synchronized,
+    ) -> None:
+        self._running_s, self._synchronized = running_s, synchronized
+        self._set = SetClock(lambda: UtcAnchor(round((utc_s() - running_s()) * NS_PER_S)), _STEP_NS)
+        self._since = running_s()
+
+    def trusted(self) -> bool:
+        """Whether the clock is kept right, and has not been set for an hour."""
+        running = self._running_s()
+        if self._set.moved_s():
+            self._since = running
+        return running - self._since >= QUIET_S and self._synchronized()
 
 
 class TrashKeeper:

@@ -45,9 +45,8 @@ from service.parts import PartLimits
 from service.processes.backends import check_backends
 from service.processes.memory import check_memory
 from service.recordings.measured_jumps import LogJudge, MeasuredJumps
-from service.recordings.steady_clock import SteadyClock
 from service.recordings.storage import usable_bytes
-from service.recordings.trash_keeper import TrashKeeper
+from service.recordings.trash_keeper import SteadyClock, TrashKeeper
 from service.regions import Regions
 from service.rehearsals import Rehearser
 from service.service import Service

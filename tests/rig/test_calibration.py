@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rig.settings.calibration import with_calibration, written_calibration
+from rig.settings.editing import with_calibration, written_calibration
 from rig.settings.file import load_rig
 
 _TEXT = """\

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from rig.errors import BadInputError
+from rig.settings.editing import with_rate, written_rate
 from rig.settings.file import load_rig
-from rig.settings.rate import with_rate, written_rate
 
 TEXT = """name = "hill"
 

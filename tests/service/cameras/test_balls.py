@@ -18,8 +18,7 @@ from rig.clocks import UtcNs
 from rig.errors import StorageError, UnknownCameraError
 from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import AnalysisSettings, RigSettings
-from service.aiming.balls import BallPlaces
-from service.aiming.files import ORIENTATION
+from service.aiming.balls import ORIENTATION, BallPlaces
 from service.aiming.kept import keep
 from service.aiming.places import Balls, places
 from simrig.world.scenario import Scenario, SceneCamera, load_scenario

@@ -14,9 +14,8 @@ from rig.events import Event
 from rig.host.disk import ask_free_bytes
 from rig.settings.file import load_rig
 from rig.settings.model import RigSettings
-from service.recordings.steady_clock import SteadyClock
 from service.recordings.storage import bytes_per_s, check_room_for
-from service.recordings.trash_keeper import TrashKeeper
+from service.recordings.trash_keeper import SteadyClock, TrashKeeper
 from tests.recorder.logs import ALL_OK, write_log
 
 SIM = load_rig(Path("config/rigs/sim.toml"))

@@ -3,7 +3,7 @@
 The JSON schema that stands in every log comes from these types.
 """
 
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import Meta
@@ -220,4 +220,4 @@ class Health(msgspec.Struct, frozen=True):
 
 
 #: The JSON schema of a health record.
-HEALTH_SCHEMA: Final[dict[str, Any]] = wire.schema(Health, HEALTH.schema)
+HEALTH_SCHEMA: Final[dict[str, object]] = wire.schema(Health, HEALTH.schema)

@@ -5,7 +5,7 @@ in degrees; what was never measured is null. A live state knows the pulses until
 that was measured before and not at this pulse has the status `predicted` and a sigma that says so.
 """
 
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import Meta
@@ -89,4 +89,4 @@ class JumperState(msgspec.Struct, frozen=True, kw_only=True, rename={"time": "ti
 _DECODER: Final = wire.decoder(JumperState)
 
 #: The JSON schema of a state.
-JUMPER_SCHEMA: Final[dict[str, Any]] = wire.schema(JumperState, JUMPER.schema)
+JUMPER_SCHEMA: Final[dict[str, object]] = wire.schema(JumperState, JUMPER.schema)

@@ -4,7 +4,7 @@ Its JSON form is fixed. 64-bit integers are strings in it, because JavaScript wo
 the JSON schema that stands in every log come from the types below.
 """
 
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
@@ -133,4 +133,4 @@ class TripletTag(msgspec.Struct, frozen=True, rename={"time": "time_ns"}):
 _DECODER: Final = wire.decoder(TripletTag)
 
 #: The JSON schema of a tag.
-TAG_SCHEMA: Final[dict[str, Any]] = wire.schema(TripletTag, TAG.schema)
+TAG_SCHEMA: Final[dict[str, object]] = wire.schema(TripletTag, TAG.schema)

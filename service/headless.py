@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self, TypeVar
+from typing import Final, Self, TypeVar
 
 from rig.api.recordings import Counts, SessionFields
 from rig.api.status import State
@@ -295,7 +295,7 @@ class Recorded:
             return error if isinstance(error, StorageError) else StorageError(str(error))
         return StorageError(f"{report.path}: {report.trouble}") if report.trouble else None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """As `svev record --json` prints it."""
         return {
             "log": str(self.report.path),

@@ -8,7 +8,7 @@ import json
 import os
 import sys
 import unicodedata
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, Final, cast
@@ -105,13 +105,13 @@ def say_marked(mark: str, style: str, line: str) -> None:
         _stdout.print(Text.assemble("  ", (mark, style), "  ", visible(line)))
 
 
-def print_json(result: dict[str, Any]) -> None:
+def print_json(result: Mapping[str, object]) -> None:
     """Print the result as one JSON object, the last thing on standard output."""
     with _to_standard_output():
         sys.stdout.write(json.dumps(result, indent=2) + "\n")
 
 
-def print_json_line(result: dict[str, Any]) -> None:
+def print_json_line(result: Mapping[str, object]) -> None:
     """Print one of many results as a JSON object on one line, at once."""
     with _to_standard_output():
         sys.stdout.write(json.dumps(result) + "\n")

@@ -3,22 +3,23 @@
 import re
 import socket
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from analysis.film.contact_sheet import write_contact_sheet
 from recorder.checking.verify import verify
 from recorder.log.beside import survey_path, truth_path
-from recorder.publishing.subscriber import free_address, subscriber
+from recorder.publishing.subscriber import SubscriberCount, free_address, subscriber
 from rig.errors import BadInputError
 from rig.host.endings import counted_endings
 from rig.settings.file import CONFIG, load_rig
 from rig.settings.model import RigSettings, SimulationSettings
-from service.headless import HeadlessRig, record
+from service.headless import HeadlessRig, Recorded, record
 from service.recordings.storage import new_log_path
 from svev import console
 from svev.claims import folder_claim
-from svev.demo_analysis import measure
+from svev.demo_analysis import Measured, measure
 
 Bus = Literal["gige", "firewire", "sim"]
 Shown = Literal["training", "hard", "faults"]
@@ -35,7 +36,7 @@ _BLOCKS: Final = 64
 
 def run_demo(
     bus: Bus, shown: Shown, seconds: float, out: Path, say: Callable[[str], None], *, analyze: bool = True
-) -> dict[str, Any]:
+) -> "Demonstrated":
     """Record for `seconds` on the simulated hill, with a subscriber that counts the triplets; measure the jumps.
 
     Args:
@@ -45,10 +46,6 @@ def run_demo(
         out: folder for the files.
         say: prints a line for people.
         analyze: measure the jumps too.
-
-    Returns:
-        The recording's result, what the subscriber counted, the verdict of the check, paths of the files, and what was
-        measured.
 
     Raises:
         SvevError: as `service.headless.record`, and if images are missing because of the disk.
@@ -74,15 +71,57 @@ def run_demo(
     report = verify(path)
     sheet = path.with_suffix(".png")
     write_contact_sheet(path, sheet)
-    return recorded.to_json() | {
-        "rate_hz": rig.trigger.rate_hz,
-        "subscriber": {name: getattr(counted, name) for name in ("received", "missing", "bytes", "latency_ms")},
-        "verdict": report.verdict,
-        "contact_sheet": str(sheet),
-        "truth": str(truth_path(path)),
-        "survey": str(survey_path(path)),
-        "analysis": measure(path, say) if analyze else None,
-    }
+    analysis = measure(path, say) if analyze else None
+    return Demonstrated(recorded, rig.trigger.rate_hz, counted, report.verdict, sheet, analysis)
+
+
+@dataclass(frozen=True, slots=True)
+class Demonstrated:
+    """What came of a demonstration.
+
+    Attributes:
+        recorded: the recording.
+        rate_hz: of its pulses.
+        subscriber: counted by the subscriber.
+        verdict: of the check of the log.
+        contact_sheet: a picture of its frames.
+        analysis: the measured jumps; None: nobody asked.
+    """
+
+    recorded: Recorded
+    rate_hz: float
+    subscriber: SubscriberCount
+    verdict: str
+    contact_sheet: Path
+    analysis: Measured | None
+
+    @property
+    def log(self) -> Path:
+        """The log."""
+        return self.recorded.report.path
+
+    @property
+    def truth(self) -> Path:
+        """The truth of the simulated hill."""
+        return truth_path(self.log)
+
+    @property
+    def survey(self) -> Path:
+        """The survey of its balls."""
+        return survey_path(self.log)
+
+    def to_json(self) -> dict[str, object]:
+        """All of it as `svev demo --json` prints it."""
+        names = ("received", "missing", "bytes", "latency_ms")
+        return self.recorded.to_json() | {
+            "rate_hz": self.rate_hz,
+            "subscriber": {name: getattr(self.subscriber, name) for name in names},
+            "verdict": self.verdict,
+            "contact_sheet": str(self.contact_sheet),
+            "truth": str(self.truth),
+            "survey": str(self.survey),
+            "analysis": None if self.analysis is None else self.analysis.to_json(),
+        }
 
 
 def _showing(rig_file: Path, shown: Shown) -> tuple[RigSettings, str]:

@@ -48,28 +48,78 @@ class Comparison:
         return f"{self.name:28}{plus_minus(self.measured, self.unit):24}true {self.true:.2f}"
 
 
-def measure(log: Path, say: Callable[[str], None]) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class MeasuredJump:
+    """A jump beside its truth.
+
+    Attributes:
+        number: of the jump.
+        verdict: on it.
+        at: where its figures are of.
+        figures: with their truth.
+    """
+
+    number: int
+    verdict: str
+    at: str
+    figures: tuple[Comparison, ...]
+
+    def to_json(self) -> dict[str, object]:
+        """The jump as `svev demo --json` prints it."""
+        figures = [
+            {"name": each.name, **asdict(each.measured), "true": each.true, "words": each.words()}
+            for each in self.figures
+        ]
+        return {"number": self.number, "verdict": self.verdict, "at": self.at, "figures": figures}
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What was measured.
+
+    Attributes:
+        out: folder of the results; None: there are none.
+        jumps: beside their truth.
+        message: why there are no results.
+    """
+
+    out: Path | None
+    jumps: tuple[MeasuredJump, ...] = ()
+    message: str = ""
+
+    @property
+    def report(self) -> Path | None:
+        """The page for the coach."""
+        return self.out and self.out / "report.html"
+
+    def to_json(self) -> dict[str, object]:
+        """All of it as `svev demo --json` prints it."""
+        return {
+            "out": self.out and str(self.out),
+            "report": self.report and str(self.report),
+            "jumps": [jump.to_json() for jump in self.jumps],
+            "message": self.message,
+        }
+
+
+def measure(log: Path, say: Callable[[str], None]) -> Measured:
     """Measure the jumps with the survey beside the log, write the results into a folder beside it.
 
     Args:
         log: of a simulated rig.
         say: prints a line for people.
 
-    Returns:
-        Paths, and for each jump figures with their truth; a message alone if nobody jumps in the log.
-
     Raises:
         SvevError: as `analysis.procedure.analyze.analyze`.
     """
     folder = log.with_suffix("")
     say("measuring the jumper")
-    found: dict[str, Any] = {"out": None, "report": None, "jumps": [], "message": ""}
     try:
         with console.steps() as tell:
             analysis = analyze(log, read_source(survey_path(log), None), progress=tell)
             write_folder(analysis, log, folder, progress=tell)
     except NoJumpError as error:
-        return found | {"message": str(error)}
+        return Measured(None, message=str(error))
     truth = json.loads(truth_path(log).read_text(encoding="utf-8"))
     hill = {int(pulse): number for pulse, number in truth["hill_pulse_of_recording"].items()}
     states = {state["pulse"]: state for state in truth["pulses"]}
@@ -79,9 +129,8 @@ def measure(log: Path, say: Callable[[str], None]) -> dict[str, Any]:
         true = {} if pulse is None else states.get(hill.get(pulse.pulse, -1), {})
         found_there = compared(pulse.smoothed, true) if pulse and pulse.smoothed and true else []
         where = "" if pulse is None else f"pulse {pulse.pulse}, {pulse.since_takeoff_s:.2f} s after the take-off"
-        figures = [{"name": c.name, **asdict(c.measured), "true": c.true, "words": c.words()} for c in found_there]
-        jumps.append({"number": jump.number, "verdict": jump.verdict.message, "at": where, "figures": figures})
-    return found | {"out": str(folder), "report": str(folder / "report.html"), "jumps": jumps}
+        jumps.append(MeasuredJump(jump.number, jump.verdict.message, where, tuple(found_there)))
+    return Measured(folder, tuple(jumps))
 
 
 def compared(state: SmoothedState, true: Mapping[str, Any]) -> list[Comparison]:

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from ipaddress import IPv4Address
 from pathlib import Path
 from statistics import median
-from typing import Any, Final
+from typing import Final
 
 from recorder.checking.verify import VerifyReport, verify
 from recorder.reading.items import Chunk
@@ -87,7 +87,7 @@ class Rehearsed:
             parts.append("for set-up only")
         return ", ".join(parts)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """The rehearsal as one JSON object."""
         return {"ready": self.ready, "verdict": self.verdict} | asdict(self)
 

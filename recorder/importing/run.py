@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import count, islice
 from pathlib import Path
-from typing import Any
 
 from recorder.importing.description import EPOCH, date_in_words, provenance, rig_toml
 from recorder.importing.film_triplets import SESSION, FilmTriplets
@@ -47,7 +46,7 @@ class ImportReport:
     fields: Mapping[str, str]
     findings: tuple[str, ...]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """The report as one JSON object."""
         return {
             "log": str(self.path),

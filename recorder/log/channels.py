@@ -80,5 +80,5 @@ def _protobuf(id_: int, message: Any) -> Schema:
     return Schema(id=id_, name=message.DESCRIPTOR.full_name, encoding="protobuf", data=data)
 
 
-def _json(id_: int, topic: Topic, schema: dict[str, Any]) -> Schema:
+def _json(id_: int, topic: Topic, schema: dict[str, object]) -> Schema:
     return Schema(id=id_, name=topic.schema, encoding="jsonschema", data=json.dumps(schema).encode())

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 from recorder.log.extent import CONTINUES, CONTINUES_AFTER, extent
 from recorder.merging.calibration_file import Attached, joined_calibration
@@ -60,7 +59,7 @@ class MergeReport:
     alignment: Alignment
     alone: tuple[int, int]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """The report as one JSON object."""
         return {
             "sources": [str(source) for source in self.sources],

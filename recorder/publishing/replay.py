@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import zmq
 
@@ -87,7 +86,7 @@ class ReplayReport:
     truncated: bool = False
     damaged_bytes: int = 0
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """The report as one JSON object."""
         return asdict(self)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -84,7 +84,7 @@ class RecoverReport:
         """What is not known of the end of the recording; empty: the source had been closed."""
         return "" if self.was_closed else _end_unknown(self.ledger, was_written=self.was_written).text
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """The report as one JSON object."""
         return {
             "source": str(self.source),

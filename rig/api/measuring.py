@@ -2,7 +2,6 @@
 
 from datetime import datetime
 from enum import StrEnum
-from typing import Any
 
 from pydantic import Field
 
@@ -69,7 +68,7 @@ class Measurement(Model):
     steps: tuple[StepState, ...] = Field((), description="what is done with the log, in order, and how far each is")
     measured: datetime | None = Field(None, description="when the log was measured, UTC")
     version: str = Field("", description="of svev, that measured it")
-    jumps: tuple[dict[str, Any], ...] | None = Field(
+    jumps: tuple[dict[str, object], ...] | None = Field(
         None, description="its jumps as in the `jumper.json` (svev-jumper/1) of the result; null: not asked for"
     )
     figures: tuple[LastJump, ...] = Field((), description="main figures of its jumps")

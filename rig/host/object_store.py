@@ -63,7 +63,7 @@ def object_store(url: str, options: Options) -> Iterator[tuple[Any, str]]:
         raise OSError(_first_line(error)) from error
 
 
-def _bounds() -> dict[str, Any]:
+def _bounds() -> dict[str, object]:
     """What botocore is to wait for at most."""
     return {
         "connect_timeout": _CONNECT_S,

@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 from rig.settings.file_kinds import FileKind, refuse_other
 from rig.settings.model import RigSettings
@@ -21,7 +20,7 @@ def load_rig(path: Path) -> RigSettings:
     content = read_toml(path)
     refuse_other(content, FileKind.RIG, path)
     rig = validate(RigSettings, content, path)
-    absolute: dict[str, Any] = {}
+    absolute: dict[str, object] = {}
     if rig.simulation is not None:
         scenario = (path.parent / rig.simulation.scenario).resolve()
         absolute["simulation"] = rig.simulation.model_copy(update={"scenario": scenario})

@@ -77,7 +77,7 @@ def decoder(kind: Any) -> msgspec.json.Decoder[Any]:
     return msgspec.json.Decoder(kind, dec_hook=_from_plain)
 
 
-def schema(kind: type[msgspec.Struct], title: str) -> dict[str, Any]:
+def schema(kind: type[msgspec.Struct], title: str) -> dict[str, object]:
     """The JSON schema of a type, without references: each is replaced by the definition that it refers to."""
     whole = msgspec.json.schema(kind, schema_hook=lambda _: _DECIMAL)
     definitions = whole.pop("$defs")

@@ -176,7 +176,7 @@ class _Results:
     """Keeps what tasks return."""
 
     def __init__(self) -> None:
-        self.found: dict[str, Any] = {}
+        self.found: dict[str, object] = {}
 
     def started(self, name: str) -> None:
         """Nothing is kept."""
@@ -217,7 +217,7 @@ class _Run:
         self._topic = f"svev-{uuid.uuid4().hex}"
         self._begun: SimpleQueue[str] = SimpleQueue()
         self._names: dict[Future[Any], str] = {}
-        self._arguments: dict[str, Any] = {}
+        self._arguments: dict[str, object] = {}
         self._suspects: list[tuple[str, Any]] = []
         self._threads, self._counted = 0, -_LOOK_S
 

@@ -1,7 +1,7 @@
 """How far the measuring of a log is that waits, or is at work."""
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 from rig.api.jump import LastJump
 from rig.api.measuring import AfterStep, Measurement, MeasuringQueue, MeasuringState, MeasuringStep, StepState
@@ -34,7 +34,7 @@ def in_queue(
     if running is None or running.recording != known.recording:
         others = [other for other in ids if running is None or other != running.recording]
         before = others.index(known.recording) + (running is not None)
-        update: dict[str, Any] = {"state": MeasuringState.WAITING, "before": before}
+        update: dict[str, object] = {"state": MeasuringState.WAITING, "before": before}
         running = None
     else:
         update = {name: getattr(running, name) for name in ("state", "paused", "step", "share")}

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import BinaryIO, Final
 
 from analysis.result.naming import bears_names
 from recorder.log.beside import measured_path
@@ -77,7 +77,7 @@ def _is_outdated(found: Outcome, log: Path) -> bool:
     return bool(found.jumps) and found.names != names_of(log)
 
 
-def jumps_in_full(log: Path) -> tuple[dict[str, Any], ...]:
+def jumps_in_full(log: Path) -> tuple[dict[str, object], ...]:
     """The jumps of the result of a log as they stand in its `jumper.json`; none if there is no such file.
 
     Raises:

@@ -1,7 +1,6 @@
 """Recordings as the panel shows them: fields, counts and continuations, and what became of each pulse."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from recorder.catalogue.entry import Entry, LogState
 from recorder.catalogue.folder import Catalogue
@@ -66,11 +65,11 @@ class Chain:
 
     def pointing_on(self, recording: Recording) -> Recording:
         """A recording with the id of the one that goes on with it; its verdict says if a part of it is gone."""
-        update: dict[str, Any] = {}
         if (by := self._following.get(recording.id)) is not None:
-            update["continued_by"] = by
+            recording = recording.model_copy(update={"continued_by": by})
+        said = recording.verdict
         if recording.continues and not self._is_here(recording.continues):
-            update["verdict"] = _without_part(
+            said = _without_part(
                 recording,
                 "verdict_part_gone",
                 recording.continues,
@@ -78,14 +77,14 @@ class Chain:
                 "Look for the first part on the other disk, or in a copy",
             )
         elif (after := self._next.get(recording.id, "")) and not self._is_here(after):
-            update["verdict"] = _without_part(
+            said = _without_part(
                 recording,
                 "verdict_next_part_gone",
                 after,
                 "Goes on in {}, which is not here: the end is missing",
                 "Look for that part in the trash, or in a copy",
             )
-        return recording.model_copy(update=update) if update else recording
+        return recording if said is recording.verdict else recording.model_copy(update={"verdict": said})
 
     def _is_here(self, part: str) -> bool:
         """Whether a part lies in the folder or in its trash."""

@@ -1,6 +1,6 @@
 """The text of a rig file with the answers in it; what is not asked about stays as it is, comments too."""
 
-from typing import Any, Final
+from typing import Final
 
 import tomlkit
 from tomlkit.items import AoT, Table
@@ -57,7 +57,7 @@ def rig_text(before: str | None, answers: Answers) -> str:
     return f"{tomlkit.dumps(document).rstrip()}\n"
 
 
-def _table(document: tomlkit.TOMLDocument, name: str) -> dict[str, Any]:
+def _table(document: tomlkit.TOMLDocument, name: str) -> dict[str, object]:
     """A table of the document, made before the cameras if missing."""
     found = document.get(name)
     if found is None:
@@ -71,11 +71,11 @@ def _table(document: tomlkit.TOMLDocument, name: str) -> dict[str, Any]:
     return found
 
 
-def _put_trigger(table: dict[str, Any], answers: Answers) -> None:
+def _put_trigger(table: dict[str, object], answers: Answers) -> None:
     known = set(_SOURCES[answers.source].model_fields)
     for key in [key for key in table if key not in known]:
         del table[key]  # of another source
-    values: dict[str, Any] = {"source": answers.source, "rate_hz": as_toml(answers.rate_hz)}
+    values: dict[str, object] = {"source": answers.source, "rate_hz": as_toml(answers.rate_hz)}
     if answers.port is not None:
         values["port"] = answers.port
     if answers.line is not None:

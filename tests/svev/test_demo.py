@@ -60,10 +60,10 @@ def test_a_hard_day_is_measured_with_the_survey_beside_the_log(tmp_path: Path) -
     truth = {"hill_pulse_of_recording": hill_pulses, "pulses": list(log.truth.values())}
     truth_path(log.path).write_text(json.dumps(truth))
     found = measure(log.path, lambda _: None)
-    figures = [figure for jump in found["jumps"] for figure in jump["figures"]]
-    assert len(figures) == 7, found["jumps"]
+    figures = [figure for jump in found.jumps for figure in jump.figures]
+    assert len(figures) == 7, found.jumps
     for figure in figures:
-        assert abs(figure["value"] - figure["true"]) < 5 * figure["sigma"] + 1e-3, figure
+        assert abs(figure.measured.value - figure.true) < 5 * figure.measured.sigma + 1e-3, figure
 
 
 @pytest.mark.long

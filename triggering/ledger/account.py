@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, Final
+from typing import Final
 
 from rig.api.recordings import Causes, Counts
 from rig.clocks import NS_PER_S, UtcNs
@@ -30,7 +30,7 @@ class IncompleteRun:
     last: PulseNumber
     cameras: tuple[tuple[str, FrameStatus], ...]
 
-    def to_json(self) -> Iterator[dict[str, Any]]:
+    def to_json(self) -> Iterator[dict[str, object]]:
         """Pulse by pulse: its number, and status by camera name."""
         statuses = {name: status.value for name, status in self.cameras}
         return ({"pulse": pulse, "cameras": statuses} for pulse in range(self.first, self.last + 1))
@@ -247,7 +247,7 @@ class Ledger:
         causes = Causes(**{status.value: self.failed.causes[status] for status in failures})
         return Counts(pulses=self.pulses, complete=self.complete, partial=self.failed.pulses, causes=causes)
 
-    def incomplete_pulses(self, limit: int) -> list[dict[str, Any]]:
+    def incomplete_pulses(self, limit: int) -> list[dict[str, object]]:
         """The pulses with missing frames one by one, as JSON; at most `limit` of them."""
         return list(islice((pulse for run in self.failed.runs for pulse in run.to_json()), limit))
 

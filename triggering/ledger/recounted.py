@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from rig.frame import FrameStatus
 from rig.pulse import PulseNumber
@@ -31,7 +30,7 @@ class Difference:
     last: PulseNumber | None = None
     by: int = 0
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """The difference as JSON."""
         found = None if self.found is None else self.found.value
         return {
@@ -73,7 +72,7 @@ class SourceAccount:
         """Whether source, tags and pairing agree."""
         return not self.findings
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """The account as JSON."""
         return {
             "fired": self.fired, "unseen": self.unseen, "untagged": self.untagged, "unfired": self.unfired,
@@ -128,7 +127,7 @@ class Recounted:
         if self.source is not None:
             yield from self.source.findings
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """The recomputed ledger as JSON."""
         return {
             "agrees": self.agrees,

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from ipaddress import IPv4Address
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
 
@@ -196,7 +196,7 @@ def _look_again(chosen: FoundCamera, wanted: IPv4Address) -> FoundCamera:
     )
 
 
-def _as_json(found: FoundCamera) -> dict[str, Any]:
+def _as_json(found: FoundCamera) -> dict[str, object]:
     port = found.interface
     return asdict(found.camera) | {
         "interface": port.name,

@@ -5,7 +5,7 @@ import sys
 from functools import partial
 from ipaddress import IPv4Network
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -205,7 +205,9 @@ def _tell_how_to_start(answers: Answers, today: Today, places: Places, written: 
     return commands
 
 
-def _as_json(answers: Answers, today: Today, places: Places, written: Written, commands: list[str]) -> dict[str, Any]:
+def _as_json(
+    answers: Answers, today: Today, places: Places, written: Written, commands: list[str]
+) -> dict[str, object]:
     return {
         "rig": str(places.folder / RIG),
         "cameras": [{"name": each.name, "backend": each.backend, "address": each.address} for each in answers.cameras],
@@ -218,7 +220,7 @@ def _as_json(answers: Answers, today: Today, places: Places, written: Written, c
     }
 
 
-def _rehearsed_json(done: Rehearsed | None, failed: str) -> dict[str, Any]:
+def _rehearsed_json(done: Rehearsed | None, failed: str) -> dict[str, object]:
     if failed:
         return {"rehearsal": {"ready": False, "verdict": failed}}
     return {"rehearsal": None if done is None else {"ready": done.ready, "verdict": done.verdict}}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -125,7 +125,7 @@ def _lines(analysis: Analysis) -> list[str]:
     return lines
 
 
-def _summary(analysis: Analysis, out: Path, files: list[Path]) -> dict[str, Any]:
+def _summary(analysis: Analysis, out: Path, files: list[Path]) -> dict[str, object]:
     return {
         "recording": analysis.result.recording,
         "out": str(out),

@@ -1,7 +1,7 @@
 """`svev adjust`: adjust any photogrammetric network."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -75,7 +75,7 @@ def adjust(
     named_points(given, datum or (), "--datum")  # before anything is computed
     named_points(given, covariance or (), "--covariance")
 
-    def adjusted() -> tuple[dict[str, Any], list[str]]:
+    def adjusted() -> tuple[dict[str, object], list[str]]:
         outcome = snoop_network(given) if snoop else adjust_least(given, state_of(_started(given)), given)
         outcome = settled(outcome)
         refuse_ambiguous(given, outcome.adjustment)

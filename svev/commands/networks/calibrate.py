@@ -1,7 +1,7 @@
 """`svev calibrate`: interior orientations from images of a 3D frame, measured already or found in pictures."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -125,7 +125,7 @@ def _from_network(
     came_from = origin(context, network=network)
     named_points(given, covariance or (), "--covariance")  # before anything is computed
 
-    def calibrated() -> tuple[dict[str, Any], list[str]]:
+    def calibrated() -> tuple[dict[str, object], list[str]]:
         calibration = calibrate_network(given)
         adjustment = calibration.outcome.adjustment
         result = with_extras(calibration_to_json(calibration), adjustment, detectable=detectable, covariance=covariance)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import typer
 
@@ -47,7 +47,7 @@ def from_pictures(
         pictures, left_out = read_pictures(paths, layout, camera, done)
     out.mkdir(parents=True, exist_ok=True)
 
-    def calibrated() -> tuple[dict[str, Any], list[str]]:
+    def calibrated() -> tuple[dict[str, object], list[str]]:
         made = calibrate_pictures(pictures, layout, measured, flat=flat)
         write_network(made.network, network_file)
         result = to_json(made)

@@ -104,15 +104,15 @@ def as_record(report: Report, came_from: Provenance, result: Mapping[str, Any], 
 
 
 def with_extras(
-    result: dict[str, Any], a: Adjustment, *, detectable: bool, covariance: Sequence[str] | None
-) -> dict[str, Any]:
+    result: dict[str, object], a: Adjustment, *, detectable: bool, covariance: Sequence[str] | None
+) -> dict[str, object]:
     """The result with what `--detectable` and `--covariance` add."""
     if detectable:
         result = with_detectable(result, a)
     return result | {"joint_covariance": joint_covariance(a, covariance)} if covariance else result
 
 
-def deliver(compute: Callable[[], tuple[dict[str, Any], list[str]]], output: Path, *, as_json: bool) -> None:
+def deliver(compute: Callable[[], tuple[dict[str, object], list[str]]], output: Path, *, as_json: bool) -> None:
     """Compute a result, write its file, and print lines for people.
 
     Args:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -85,7 +85,7 @@ def orient(
     came_from = origin(context, network=network, calibration=calibration)
     named_points(given, covariance or (), "--covariance")  # before anything is computed
 
-    def oriented() -> tuple[dict[str, Any], list[str]]:
+    def oriented() -> tuple[dict[str, object], list[str]]:
         orientation = orient_network(given, int(alternative), moving, uncertain_interior=uncertain_interior)
         orientation = replace(orientation, notes=(*left_out, *orientation.notes))
         result = with_extras(

@@ -2,13 +2,14 @@
 
 import shlex
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from svev import console
 from svev.commands.rig.record import aside, causes
 from svev.demo import Bus, Shown, run_demo
+from svev.demo_analysis import Measured
 
 
 def demo(
@@ -43,38 +44,39 @@ def demo(
     """
     result = run_demo(bus, scenario, seconds, out, aside, analyze=analyze)
     if as_json:
-        console.print_json(result)
+        console.print_json(result.to_json())
         return
-    counted, latency = result["subscriber"], result["subscriber"]["latency_ms"]
+    counts, size = result.recorded.report.counts, result.recorded.report.bytes
+    counted, latency = result.subscriber, result.subscriber.latency_ms
     console.say("")
-    console.say(f"pulses             {result['pulses']} at {result['rate_hz']:g} Hz")
-    console.say(f"complete triplets  {result['complete']}{causes(result['causes'])}")
-    console.say(f"subscriber got     {counted['received']}, missing {counted['missing']}")
+    console.say(f"pulses             {counts.pulses} at {result.rate_hz:g} Hz")
+    console.say(f"complete triplets  {counts.complete}{causes(counts.causes.model_dump())}")
+    console.say(f"subscriber got     {counted.received}, missing {counted.missing}")
     if latency["median"] is not None:
         console.say(f"latency            {latency['median']:.1f} ms median, {latency['p99']:.1f} ms at 99 %")
-    console.say(f"log                {result['log']} ({result['bytes'] / 1e6:.1f} MB), {result['verdict']}")
-    console.say(f"contact sheet      {result['contact_sheet']}")
-    console.say(f"truth              {result['truth']}")
-    if result["analysis"] is not None:
-        _say_measured(result["analysis"])
-    log, survey = Path(result["log"]), result["survey"]
-    again = ["svev", "analyze", str(log), "--survey", survey, "-o", f"{log.with_suffix('')}-again"]
-    console.say(f"survey             {survey}")
+    console.say(f"log                {result.log} ({size / 1e6:.1f} MB), {result.verdict}")
+    console.say(f"contact sheet      {result.contact_sheet}")
+    console.say(f"truth              {result.truth}")
+    if result.analysis is not None:
+        _say_measured(result.analysis)
+    again = ["svev", "analyze", str(result.log), "--survey", str(result.survey)]
+    again += ["-o", f"{result.log.with_suffix('')}-again"]
+    console.say(f"survey             {result.survey}")
     console.say(f"measure it again   {shlex.join(again)}")
 
 
-def _say_measured(analysis: dict[str, Any]) -> None:
+def _say_measured(analysis: Measured) -> None:
     """What was measured, beside the truth."""
-    if analysis["message"]:
-        console.say(f"nothing measured   {analysis['message']}")
+    if analysis.message:
+        console.say(f"nothing measured   {analysis.message}")
         return
-    for jump in analysis["jumps"]:
+    for jump in analysis.jumps:
         console.say("")
-        console.say(f"jump {jump['number']}             {jump['verdict']}")
-        if jump["figures"]:
-            console.say(f"                   at {jump['at']}:")
-        for figure in jump["figures"]:
-            console.say(f"                   {figure['words']}")
+        console.say(f"jump {jump.number}             {jump.verdict}")
+        if jump.figures:
+            console.say(f"                   at {jump.at}:")
+        for figure in jump.figures:
+            console.say(f"                   {figure.words()}")
     console.say("")
-    console.say(f"results            {analysis['out']}")
-    console.say(f"for the coach      {analysis['report']}")
+    console.say(f"results            {analysis.out}")
+    console.say(f"for the coach      {analysis.report}")

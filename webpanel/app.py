@@ -70,40 +70,46 @@ def create_app(
     Returns:
         The application; `app.state.streams` are its `OpenStreams`. Serve it with `webpanel.server.make_server`.
     """
-    changes, metrics, streams = Changes(service), Metrics(service), OpenStreams()
-    tell = partial(_tell, service)
-    door = Door(access, tell, open_links, Sessions() if sessions is None else sessions)
+    given = _given(service, access, open_links, sessions, desks)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        async with changes.watching():
+        async with given.changes.watching():
             yield
 
     app = FastAPI(
         title="Svev", version=version("svev"), description=DESCRIPTION, docs_url=None, redoc_url=None,
         redirect_slashes=False, lifespan=lifespan,
     )  # fmt: skip
-    app.state = State(
+    app.state = given
+    routes = add_routers(app, (of.router for of in _ROUTES))
+    handle_errors(app, routes)
+    serve_page(app, "/index.html")
+    app.add_middleware(Guard, door=given.door, visit=partial(links.check_visit, service))
+    app.add_middleware(Spellings, heads=[route.path_regex for route in routes if "HEAD" in (route.methods or ())])
+    app.add_middleware(CountRequests, metrics=given.metrics)
+    serve_documentation(app, access)
+    return app
+
+
+def _given(
+    service: RigService, access: Access, open_links: Links | None, sessions: Sessions | None, desks: Desks | None
+) -> State:
+    """What routes are given, by the names in `webpanel.routes.dependencies`."""
+    streams = OpenStreams()
+    return State(
         {
             "service": service,
-            "door": door,
+            "door": Door(access, partial(_tell, service), open_links, Sessions() if sessions is None else sessions),
             "desks": desks or Desks(_nothing_to_measure, lambda: None),
-            "changes": changes,
-            "metrics": metrics,
+            "changes": Changes(service),
+            "metrics": Metrics(service),
             "feed": PreviewFeed(service, streams),
             "thumbnails": Thumbnails(),
             "streams": streams,
             "threads": Threads(),
         }
     )
-    routes = add_routers(app, (of.router for of in _ROUTES))
-    handle_errors(app, routes)
-    serve_page(app, "/index.html")
-    app.add_middleware(Guard, door=door, visit=partial(links.check_visit, service))
-    app.add_middleware(Spellings, heads=[route.path_regex for route in routes if "HEAD" in (route.methods or ())])
-    app.add_middleware(CountRequests, metrics=metrics)
-    serve_documentation(app, access)
-    return app
 
 
 def _tell(service: RigService, level: Literal["info", "warning"], said: Phrase) -> None:

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
 
 from rig.api.cameras.light import CameraLight, LightChange
 from rig.events import Event, Level
@@ -14,8 +13,6 @@ from service.regions import Regions, unfit
 from service.rig_file import keep
 from service.supervision.messages import ChangeCamera
 from service.supervision.supervisor import Supervisor
-
-_ANSWER_S: Final = 10.0
 
 
 class Lights:
@@ -68,7 +65,7 @@ class Lights:
             if change.region is not None and change.region.region() != before.region:
                 self._regions.change(name, change.region.region(), new)
             elif lit:
-                supervisor.ask(partial(ChangeCamera, new=new, camera=name), _ANSWER_S)
+                supervisor.ask(partial(ChangeCamera, new=new, camera=name))
             if lit:
                 said = phrase(
                     "event_light", "exposes for {exposure_us:g} us now, with a gain of {gain_db:g} dB",

@@ -3,18 +3,14 @@
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
 
 from rig.api.parts import PartsChange, PartsView
-from rig.events import Event, Level
 from rig.phrase import Phrase, phrase
 from rig.settings.editing import written_parts
 from rig.settings.model import RecorderSettings
 from service.rig_file import keep
 from service.supervision.messages import ChangeParts
 from service.supervision.supervisor import Supervisor
-
-_ANSWER_S: Final = 10.0
 
 
 class PartLimits:
@@ -48,10 +44,9 @@ class PartLimits:
             if recorder != in_use.rig.recorder:
                 rig = in_use.rig.model_copy(update={"recorder": recorder})
                 new = replace(in_use, rig=rig, toml=written_parts(in_use.toml, part_s, part_gb))
-                self._supervisor.ask(partial(ChangeParts, new=new), _ANSWER_S)
                 text = "recordings are split from the next one on: {limits}"
                 said = phrase("event_parts", text, limits=_in_words(part_s, part_gb))
-                self._supervisor.hub.tell(Event.now(Level.INFO, "recorder", said))
+                self._supervisor.change(partial(ChangeParts, new=new), "recorder", said)
             if change.save:
                 self._keep(part_s, part_gb)
             return self.view()

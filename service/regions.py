@@ -69,9 +69,8 @@ class Regions:
         check_backends(rig)
         check_memory(rig, self._preroll_s)
         new = replace(also, rig=rig, toml=written_region(also.toml, name, region, camera.calibrated_region))
-        supervisor.ask(partial(ChangeRegion, new=new, camera=name), _TRIAL_ENDS_S)
         said = phrase("event_region", "reads out {region} now", region=named(region))
-        supervisor.hub.tell(Event.now(Level.INFO, name, said))
+        supervisor.change(partial(ChangeRegion, new=new, camera=name), name, said, _TRIAL_ENDS_S)
         if (why := calibration_unfit(camera)) is not None:
             supervisor.hub.tell(Event.now(Level.WARNING, name, why))
 

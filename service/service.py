@@ -139,11 +139,11 @@ class Service(Archive):
             return self._begin_to_arm(order)
 
     def _begin_to_arm(self, order: ArmOrder) -> Status:
-        return self._supervisor.ask(partial(Arm, min_cameras=order.min_cameras), _ANSWER_S)
+        return self._supervisor.ask(partial(Arm, min_cameras=order.min_cameras))
 
     def acknowledge(self, alarm: int) -> Status:
         """Note that somebody has seen an alarm."""
-        self._supervisor.ask(partial(Acknowledge, alarm=alarm), _ANSWER_S)
+        self._supervisor.ask(partial(Acknowledge, alarm=alarm))
         return self.status()
 
     def rehearsals(self) -> Rehearsals:
@@ -173,7 +173,7 @@ class Service(Archive):
 
     def disarm(self) -> Status:
         """Begin to disarm."""
-        return self._supervisor.ask(Disarm, _ANSWER_S)
+        return self._supervisor.ask(Disarm)
 
     def start_recording(self, order: RecordingOrder) -> Recording:
         """Start; returns when the log is open. What lies in the trash makes room for it if it must."""
@@ -216,7 +216,7 @@ class Service(Archive):
         entry = self._catalogue.change_session(recording_id, change.texts())
         self._measurings.renamed(recording_id, self._catalogue.file(recording_id))
         note = partial(ChangeSession, recording=recording_id, change=change.fields())
-        return self._supervisor.ask(note, _ANSWER_S) or self._with_next_part(entry)
+        return self._supervisor.ask(note) or self._with_next_part(entry)
 
     def delete_recording(self, recording_id: str) -> Recording:
         """Put a recording into the trash."""

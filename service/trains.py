@@ -3,13 +3,12 @@
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
 
 from capture.iidc.configuration import READOUT_NS
 from rig.api.trigger import TriggerChange, TriggerControl, TriggerView
 from rig.clocks import NS_PER_US
 from rig.errors import BadInputError, StateForbidsError
-from rig.events import TRIGGER, Event, Level
+from rig.events import TRIGGER
 from rig.phrase import Phrase, phrase
 from rig.settings.editing import with_rate, written_rate
 from rig.settings.model import RigSettings
@@ -19,8 +18,6 @@ from service.rig_file import keep
 from service.supervision.messages import Burst, ChangeRate, RunTrain
 from service.supervision.supervisor import Supervisor
 from triggering.sources.choice import trigger_source
-
-_ANSWER_S: Final = 10.0
 
 
 class Trains:
@@ -59,7 +56,7 @@ class Trains:
             self._check_made_here(TriggerControl.RATE)
             if change.running is not None:
                 self._check_made_here(TriggerControl.RUNNING)
-                self._supervisor.ask(partial(RunTrain, running=change.running), _ANSWER_S)
+                self._supervisor.ask(partial(RunTrain, running=change.running))
             if change.rate_hz is not None and change.rate_hz != self._supervisor.rig.trigger.rate_hz:
                 self._change_rate(change.rate_hz)
             if change.save:
@@ -74,7 +71,7 @@ class Trains:
         """
         with self._supervisor.changing:
             self._check_made_here(TriggerControl.RUNNING)
-            self._supervisor.ask(partial(Burst, pulses=pulses), _ANSWER_S)
+            self._supervisor.ask(partial(Burst, pulses=pulses))
             return self.view()
 
     def _check_made_here(self, control: TriggerControl) -> None:
@@ -113,9 +110,8 @@ class Trains:
         _check_dead_time(rig)
         check_memory(rig, self._preroll_s)
         new = replace(in_use, rig=rig, toml=written_rate(in_use.toml, rate_hz))
-        supervisor.ask(partial(ChangeRate, new=new), _ANSWER_S)
         said = phrase("event_rate", "is to make {rate_hz:g} pulses per second from now on", rate_hz=rate_hz)
-        supervisor.hub.tell(Event.now(Level.INFO, TRIGGER, said))
+        supervisor.change(partial(ChangeRate, new=new), TRIGGER, said)
 
     def _keep(self, rate_hz: float) -> None:
         def not_kept(why: str) -> Phrase:

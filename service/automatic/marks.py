@@ -18,7 +18,6 @@ from service.automatic.watch import MotionWatch
 from service.supervision.messages import MotionSeen, NotBegun, Note
 from service.supervision.supervisor import Supervisor
 
-_ANSWER_S: Final = 10.0
 #: A mark may be so old, and so far in the future, because clocks differ.
 _OLDEST_MARK_S: Final = 60.0
 _CLOCKS_DIFFER_S: Final = 1.0
@@ -73,7 +72,7 @@ class Marks:
         age_s = _age_s(mark)
         source, age = mark.source or "?", f"{age_s:.1f}"
         said = phrase("event_marked", "a jump is marked by {source}, {age} s ago", source=source, age=age)
-        self._supervisor.ask(partial(Note, event=Event.now(Level.INFO, "mark", said)), _ANSWER_S)
+        self._supervisor.ask(partial(Note, event=Event.now(Level.INFO, "mark", said)))
         if (running := self._status().recording) is not None:
             return Marked(started=False, recording=running)
         settings = self._settings
@@ -119,7 +118,7 @@ class Marks:
             if self._motion is not None and self._motion.on:
                 self.mark(_mark("motion", time))
                 return
-            self._supervisor.ask(MotionSeen, _ANSWER_S)
+            self._supervisor.ask(MotionSeen)
         except SvevError as error:
             self._not_begun("motion", error.said)
 
@@ -133,7 +132,7 @@ class Marks:
     def _not_begun(self, name: str, why: Phrase) -> None:
         """Say that a jump came and no recording could begin: an alarm, until the next one begins."""
         try:
-            self._supervisor.ask(partial(NotBegun, why=why), _ANSWER_S)
+            self._supervisor.ask(partial(NotBegun, why=why))
         except SvevError:  # the service ends, or does not answer: then the log alone can say it
             self._tell(Level.WARNING, name, phrase("event_unrecorded", "no recording could begin: {why}", why=why))
 

@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from rig.events import Event, Level
 from rig.host.disk import replace_file
 from rig.phrase import Phrase, phrase
 from rig.settings.editing import with_calibration, written_calibration
@@ -14,7 +13,6 @@ from service.supervision.messages import ChangeCalibration
 from service.supervision.situation import RigInUse
 from service.supervision.supervisor import Supervisor
 
-_ANSWER_S: Final = 10.0
 _JOINED: Final = "joined.json"
 
 
@@ -49,9 +47,8 @@ class CalibrationKeeper:
             rig = with_calibration(supervisor.rig, file, cameras)
             text = written_calibration(supervisor.now.in_use.toml, file, cameras)
             new = RigInUse(rig, text, read_calibration(rig))
-            supervisor.ask(partial(ChangeCalibration, new=new), _ANSWER_S)
             said = phrase("event_calibration", "is {file} from now on", file=str(file))
-            supervisor.hub.tell(Event.now(Level.INFO, "calibration", said))
+            supervisor.change(partial(ChangeCalibration, new=new), "calibration", said)
 
             def not_kept(why: str) -> Phrase:
                 text = (

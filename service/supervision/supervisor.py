@@ -17,7 +17,7 @@ from typing import Final, TypeVar
 from rig.api.status import Status
 from rig.errors import ProcessDiedError
 from rig.events import Event, Level
-from rig.phrase import phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.transport.recorder_commands import RecorderOptions
 from service.jumpers.book import JumperBook
@@ -34,6 +34,7 @@ from service.supervision.world import World
 
 T = TypeVar("T")
 _TURN_S: Final = 0.2
+_ANSWER_S: Final = 10.0
 _RECORDING_ENDS_S: Final = 4.0
 
 
@@ -119,7 +120,7 @@ class Supervisor:
         """Whether a recording runs or is being opened; any thread may ask."""
         return self.now.recordings.current is not None
 
-    def ask(self, make: "Callable[[Future[T]], Command[T]]", deadline_s: float) -> T:
+    def ask(self, make: "Callable[[Future[T]], Command[T]]", deadline_s: float = _ANSWER_S) -> T:
         """Give a command, and wait for its answer; any thread but its own may do so. See `Commands.ask`.
 
         Raises:
@@ -127,6 +128,20 @@ class Supervisor:
             SvevError: why the command cannot be obeyed.
         """
         return self._commands.ask(make, deadline_s)
+
+    def change(
+        self, make: "Callable[[Future[None]], Command[None]]", name: str, said: Phrase, deadline_s: float = _ANSWER_S
+    ) -> None:
+        """Give a command that changes the rig in use, wait until it is obeyed, and tell of it; errors as of `ask`.
+
+        Args:
+            make: makes the command.
+            name: the part that the event is about.
+            said: the change.
+            deadline_s: longest time to wait, s.
+        """
+        self.ask(make, deadline_s)
+        self.hub.tell(Event.now(Level.INFO, name, said))
 
     def start(self) -> None:
         """Start the thread."""

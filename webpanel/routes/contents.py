@@ -38,7 +38,6 @@ _PNG: Responses = {
     }
 }
 
-
 router = strict_router("Recordings")
 
 

@@ -1,7 +1,6 @@
 """What routes are given: the objects of their application, which stand in its state, and places among long answers."""
 
 from collections.abc import AsyncIterator
-from operator import attrgetter
 from typing import Annotated, Any
 
 from fastapi import Depends, Request
@@ -30,10 +29,9 @@ def _place(kind: str) -> Any:
     Raises:
         ProblemError: 503, the largest number are open.
     """
-    of_kind = attrgetter(kind)
 
     async def taken(request: Request) -> AsyncIterator[None]:
-        async with of_kind(request.app.state.streams).place():
+        async with getattr(request.app.state.streams, kind).place():
             yield
 
     return Depends(taken)

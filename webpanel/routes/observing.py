@@ -19,7 +19,6 @@ class Health(Model):
 
 _UNWELL: Final[Responses] = {503: {"description": "The service is unwell.", "model": Health}}
 
-
 router = strict_router("Observing", prefix="")
 
 

@@ -32,7 +32,6 @@ _After = Annotated[int, Query(ge=-1, lt=2**63, description="pulse seen last; -1:
 _PEAKING_COLOUR = (255, 0, 255)
 _STREAM: Responses = {200: {"description": "Pictures, one after the other.", "content": _CONTENT}}
 
-
 router = strict_router("Watching")
 
 

@@ -5,6 +5,38 @@ from typing import Final
 from rig.api.status import State
 from rig.phrase import Phrase, phrase
 
+#: Changes of the rig in use, by call.
+_CHANGES: Final = {
+    "expose": phrase("change_light", "change exposure or gain"),
+    "rate": phrase("change_rate", "change the rate"),
+    "region": phrase("change_region", "change the region"),
+    "calibrate": phrase("change_calibration", "use the calibration"),
+}
+
+
+def _no_change(change: Phrase) -> dict[State, Phrase]:
+    """Why a state forbids a change, and what to do."""
+    return {
+        State.ARMING: phrase(
+            "forbidden_change_arming", "the rig is being armed: wait until it is armed, then {change}", change=change
+        ),
+        State.ARMED: phrase(
+            "forbidden_change_armed", "a recording is about to start: stop it, then {change}", change=change
+        ),
+        State.RECORDING: phrase(
+            "forbidden_change_recording", "a recording is running: stop it, then {change}", change=change
+        ),
+        State.DISARMING: phrase(
+            "forbidden_change_disarming",
+            "the rig is being disarmed: wait until that is done, then {change}",
+            change=change,
+        ),
+        State.FAULT: phrase(
+            "forbidden_change_fault", "the rig is being tried again: wait a moment, then {change}", change=change
+        ),
+    }
+
+
 #: Why a state forbids a call, and what to do, by call and state.
 FORBIDDEN: Final[dict[tuple[str, State], Phrase]] = {
     ("arm", State.DISARMING): phrase(
@@ -22,66 +54,6 @@ FORBIDDEN: Final[dict[tuple[str, State], Phrase]] = {
         "forbidden_rehearse_disarming", "the rig is being disarmed: wait until that is done, then rehearse"
     ),
     ("rehearse", State.FAULT): phrase("forbidden_rehearse_fault", "the rig has a fault: disarm it, then rehearse"),
-    ("expose", State.ARMING): phrase(
-        "forbidden_expose_arming", "the rig is being armed: wait until it is armed, then change exposure or gain"
-    ),
-    ("expose", State.ARMED): phrase(
-        "forbidden_expose_armed", "a recording is about to start: stop it, then change exposure or gain"
-    ),
-    ("expose", State.RECORDING): phrase(
-        "forbidden_expose_recording", "a recording is running: stop it, then change exposure or gain"
-    ),
-    ("expose", State.DISARMING): phrase(
-        "forbidden_expose_disarming", "the rig is being disarmed: wait until that is done, then change exposure or gain"
-    ),
-    ("expose", State.FAULT): phrase(
-        "forbidden_expose_fault", "the rig is being tried again: wait a moment, then change exposure or gain"
-    ),
-    ("rate", State.ARMING): phrase(
-        "forbidden_rate_arming", "the rig is being armed: wait until it is armed, then change the rate"
-    ),
-    ("rate", State.ARMED): phrase(
-        "forbidden_rate_armed", "a recording is about to start: stop it, then change the rate"
-    ),
-    ("rate", State.RECORDING): phrase(
-        "forbidden_rate_recording", "a recording is running: stop it, then change the rate"
-    ),
-    ("rate", State.DISARMING): phrase(
-        "forbidden_rate_disarming", "the rig is being disarmed: wait until that is done, then change the rate"
-    ),
-    ("rate", State.FAULT): phrase(
-        "forbidden_rate_fault", "the rig is being tried again: wait a moment, then change the rate"
-    ),
-    ("region", State.ARMING): phrase(
-        "forbidden_region_arming", "the rig is being armed: wait until it is armed, then change the region"
-    ),
-    ("region", State.ARMED): phrase(
-        "forbidden_region_armed", "a recording is about to start: stop it, then change the region"
-    ),
-    ("region", State.RECORDING): phrase(
-        "forbidden_region_recording", "a recording is running: stop it, then change the region"
-    ),
-    ("region", State.DISARMING): phrase(
-        "forbidden_region_disarming", "the rig is being disarmed: wait until that is done, then change the region"
-    ),
-    ("region", State.FAULT): phrase(
-        "forbidden_region_fault", "the rig is being tried again: wait a moment, then change the region"
-    ),
-    ("calibrate", State.ARMING): phrase(
-        "forbidden_calibrate_arming", "the rig is being armed: wait until it is armed, then use the calibration"
-    ),
-    ("calibrate", State.ARMED): phrase(
-        "forbidden_calibrate_armed", "a recording is about to start: stop it, then use the calibration"
-    ),
-    ("calibrate", State.RECORDING): phrase(
-        "forbidden_calibrate_recording", "a recording is running: stop it, then use the calibration"
-    ),
-    ("calibrate", State.DISARMING): phrase(
-        "forbidden_calibrate_disarming", "the rig is being disarmed: wait until that is done, then use the calibration"
-    ),
-    ("calibrate", State.FAULT): phrase(
-        "forbidden_calibrate_fault", "the rig is being tried again: wait a moment, then use the calibration"
-    ),
     ("pulses", State.IDLE): phrase(
         "forbidden_pulses_idle", "the rig is not armed: arm it, then stop or ask for pulses"
     ),
@@ -111,4 +83,4 @@ FORBIDDEN: Final[dict[tuple[str, State], Phrase]] = {
     ("start", State.FAULT): phrase(
         "forbidden_start_fault", "the rig has a fault: see its statement for what to do, then start recording"
     ),
-}
+} | {(call, state): why for call, change in _CHANGES.items() for state, why in _no_change(change).items()}

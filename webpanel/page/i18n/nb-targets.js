@@ -29,9 +29,4 @@ export const targets = {
   act_calibrating_undone: ["tok bort det siste bildet av et mål"],
   act_calibrated: ["ba om at en kalibrering regnes ut"],
   act_calibration_saved: ["la kalibreringen i riggfilen"],
-  forbidden_calibrate_arming: ["riggen gjøres klar: vent til den er klar, og ta så kalibreringen i bruk"],
-  forbidden_calibrate_armed: ["et opptak er i ferd med å starte: stopp det før du tar kalibreringen i bruk"],
-  forbidden_calibrate_recording: ["det tas opp: stopp opptaket før du tar kalibreringen i bruk"],
-  forbidden_calibrate_disarming: ["riggen kobles ned: vent til det er gjort, og ta så kalibreringen i bruk"],
-  forbidden_calibrate_fault: ["riggen prøves på nytt: vent litt, og ta så kalibreringen i bruk"],
 };

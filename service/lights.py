@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.api.cameras.light import CameraLight, LightChange
 from rig.events import Event, Level
-from rig.phrase import Phrase, phrase
+from rig.phrase import phrase
 from rig.settings.camera import CameraSettings
 from rig.settings.light import camera_of, with_light, written
 from service.regions import Regions, unfit
@@ -79,18 +79,9 @@ class Lights:
 
     def _keep(self, name: str, exposure_us: float, gain_db: float) -> None:
         """Write exposure and gain of a camera into the rig file."""
-
-        def not_kept(why: str) -> Phrase:
-            text = (
-                "{path}: cannot be written ({why}); write exposure_us = {exposure_us:g} and gain_db = {gain_db:g} of "
-                "{camera} into it, or a restart of the service loses them"
-            )
-            return phrase(
-                "why_light_not_kept", text,
-                path=str(self._file), why=why, exposure_us=exposure_us, gain_db=gain_db, camera=name,
-            )  # fmt: skip
-
-        keep(self._file, lambda text: written(text, name, {"exposure_us": exposure_us, "gain_db": gain_db}), not_kept)
+        text = "write exposure_us = {exposure_us:g} and gain_db = {gain_db:g} of {camera} into it"
+        by_hand = phrase("keep_light", text, exposure_us=exposure_us, gain_db=gain_db, camera=name)
+        keep(self._file, lambda text: written(text, name, {"exposure_us": exposure_us, "gain_db": gain_db}), by_hand)
         self._kept[name] = exposure_us, gain_db
 
 

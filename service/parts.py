@@ -52,14 +52,8 @@ class PartLimits:
             return self.view()
 
     def _keep(self, part_s: float | None, part_gb: float | None) -> None:
-        def not_kept(why: str) -> Phrase:
-            text = (
-                "{path}: cannot be written ({why}); change part_s and part_gb under [recorder] in it, or a restart of "
-                "the service forgets them"
-            )
-            return phrase("why_parts_not_kept", text, path=str(self._file), why=why)
-
-        keep(self._file, lambda text: written_parts(text, part_s, part_gb), not_kept)
+        by_hand = phrase("keep_parts", "change part_s and part_gb under [recorder] in it")
+        keep(self._file, lambda text: written_parts(text, part_s, part_gb), by_hand)
         self._kept = part_s, part_gb
 
 

@@ -9,7 +9,7 @@ from capture.iidc.bandwidth import is_fixed_format
 from rig.api.statement import Level as StatementLevel
 from rig.api.statement import Statement
 from rig.events import Event, Level
-from rig.phrase import Phrase, phrase
+from rig.phrase import phrase
 from rig.settings.camera import CameraSettings, Region
 from rig.settings.light import camera_of
 from rig.settings.region import RegionLimits, calibration_unfit, named, with_region, written_region
@@ -84,19 +84,11 @@ class Regions:
         camera = camera_of(self._supervisor.rig, name)
         if self.saved(camera):
             return
-
-        def not_kept(why: str) -> Phrase:
-            text = (
-                "{path}: cannot be written ({why}); write region = {region} of {camera} into it, or a restart of the "
-                "service loses it"
-            )
-            table = ", ".join(f"{key} = {value}" for key, value in camera.region.model_dump().items())
-            return phrase(
-                "why_region_not_kept", text, path=str(self._file), why=why, region=f"{{ {table} }}", camera=name
-            )
-
+        table = ", ".join(f"{key} = {value}" for key, value in camera.region.model_dump().items())
+        text = "write region = {region} of {camera} into it"
+        by_hand = phrase("keep_region", text, region=f"{{ {table} }}", camera=name)
         calibrated = camera.calibrated_region
-        keep(self._file, lambda text: written_region(text, name, camera.region, calibrated), not_kept)
+        keep(self._file, lambda text: written_region(text, name, camera.region, calibrated), by_hand)
         self._kept[name] = camera.region
 
 

@@ -6,19 +6,19 @@ from pathlib import Path
 
 from rig.errors import StorageError
 from rig.host.disk import replace_file
-from rig.phrase import Phrase
+from rig.phrase import Phrase, phrase
 from rig.settings.model import RigSettings
 from rig.settings.strict_toml import read_text
 from rig.transport.recorder_commands import Calibration
 
 
-def keep(path: Path, edit: Callable[[str], str], not_kept: Callable[[str], Phrase]) -> None:
+def keep(path: Path, edit: Callable[[str], str], by_hand: Phrase) -> None:
     """Edit the rig file, as it is by then: what else was edited in it stays.
 
     Args:
         path: of the rig file.
         edit: makes the new text of the present one.
-        not_kept: what to say, given the reason, if the file cannot be written.
+        by_hand: the same as an order to a person, if the file cannot be written.
 
     Raises:
         BadInputError: the file has become unreadable.
@@ -30,7 +30,9 @@ def keep(path: Path, edit: Callable[[str], str], not_kept: Callable[[str], Phras
         os.close(os.open(path, os.O_WRONLY | os.O_CLOEXEC))
         replace_file(path, text.encode(), links=True)
     except OSError as error:
-        raise StorageError(not_kept(error.strerror or str(error))) from error
+        text = "{path}: cannot be written ({why}); {by_hand}, or a restart of the service loses the change"
+        why = error.strerror or str(error)
+        raise StorageError(phrase("why_not_kept", text, path=str(path), why=why, by_hand=by_hand)) from error
 
 
 def read_calibration(rig: RigSettings) -> Calibration | None:

@@ -9,7 +9,7 @@ from rig.api.trigger import TriggerChange, TriggerControl, TriggerView
 from rig.clocks import NS_PER_US
 from rig.errors import BadInputError, StateForbidsError
 from rig.events import TRIGGER
-from rig.phrase import Phrase, phrase
+from rig.phrase import phrase
 from rig.settings.editing import with_rate, written_rate
 from rig.settings.model import RigSettings
 from service.processes.backends import check_backends
@@ -114,14 +114,8 @@ class Trains:
         supervisor.change(partial(ChangeRate, new=new), TRIGGER, said)
 
     def _keep(self, rate_hz: float) -> None:
-        def not_kept(why: str) -> Phrase:
-            text = (
-                "{path}: cannot be written ({why}); write rate_hz = {rate_hz:g} under [trigger] into it, or a restart "
-                "of the service loses it"
-            )
-            return phrase("why_rate_not_kept", text, path=str(self._file), why=why, rate_hz=rate_hz)
-
-        keep(self._file, lambda text: written_rate(text, rate_hz), not_kept)
+        by_hand = phrase("keep_rate", "write rate_hz = {rate_hz:g} under [trigger] into it", rate_hz=rate_hz)
+        keep(self._file, lambda text: written_rate(text, rate_hz), by_hand)
         self._kept_hz = rate_hz
 
 

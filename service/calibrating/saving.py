@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from rig.host.disk import replace_file
-from rig.phrase import Phrase, phrase
+from rig.phrase import phrase
 from rig.settings.editing import with_calibration, written_calibration
 from service.rig_file import keep, read_calibration
 from service.supervision.messages import ChangeCalibration
@@ -49,15 +49,8 @@ class CalibrationKeeper:
             new = RigInUse(rig, text, read_calibration(rig))
             said = phrase("event_calibration", "is {file} from now on", file=str(file))
             supervisor.change(partial(ChangeCalibration, new=new), "calibration", said)
-
-            def not_kept(why: str) -> Phrase:
-                text = (
-                    '{path}: cannot be written ({why}); write calibration = "{file}" at its top, or a restart of the '
-                    "service loses it"
-                )
-                return phrase("why_calibration_not_kept", text, path=str(self._file), why=why, file=str(file))
-
-            keep(self._file, lambda text: written_calibration(text, file, cameras), not_kept)
+            by_hand = phrase("keep_calibration", 'write calibration = "{file}" at its top', file=str(file))
+            keep(self._file, lambda text: written_calibration(text, file, cameras), by_hand)
 
     def _with_others(self, result: Path, cameras: frozenset[str]) -> Path:
         """The result file, or one beside it that has the other cameras of the calibration before, too."""

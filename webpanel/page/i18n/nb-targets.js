@@ -22,7 +22,7 @@ export const targets = {
   target_not_good: ["kamera {camera}: IKKE godt nok for 1:{wanted}: objektivet er kjent til {lens_px} px (1:{one_to} av bildets bredde; 1:{needed} trengs)"],
   why_two_lenses: ["kamera {camera}: bilder av to objektiv: c er {other} px i {pictures}, og {c} px i de andre: zoom eller fokus er endret underveis, eller bilder av et annet kamera er blant dem", "legg bildene av hvert objektiv i en mappe for seg"],
   why_calibrating_ended: ["programmet som arbeider med bildene, tok slutt ({why})"],
-  why_calibration_not_kept: ["{path} kan ikke skrives ({why})", "skriv calibration = \"{file}\" øverst i den, ellers er det borte etter en omstart"],
+  keep_calibration: ["skriv calibration = \"{file}\" øverst i den"],
   event_calibration: ["er fra nå av {file}"],
   act_calibrating: ["begynte å ta bilder av et mål"],
   act_calibrating_ended: ["avsluttet kalibreringshjelpen"],

@@ -25,7 +25,7 @@ from recorder.reading.items import Chunk, Message, SmallRecord
 from recorder.reading.log_reader import LogReader, stream
 from recorder.reading.records import Damage
 from recorder.reading.triplets import pixels, view_image
-from recorder.recovering.unfinished_log import unfinished_log
+from recorder.recovering.unfinished_log import check_target, unfinished_log
 from rig.errors import BadInputError, LogDamagedError, StorageError
 from rig.host.disk import sync
 from rig.images.pixels import Stored
@@ -84,10 +84,7 @@ def compact(source: Path, target: Path, progress: Callable[[int], None] | None =
         LogDamagedError: the log was not closed or is damaged.
         StorageError: the disk refuses, or what was read back is not what was written; nothing of the new log is left.
     """
-    if target.exists():
-        raise BadInputError(f"{target}: exists already and is never overwritten; choose another name")
-    if not target.parent.is_dir():
-        raise BadInputError(f"{target.parent}: no such directory; make it, or choose another one")
+    check_target(target)
     done = progress or (lambda _: None)
     with LogReader(source) as reader:
         if not reader.closed and is_being_written(source):

@@ -20,7 +20,7 @@ from recorder.reading.info import merged_in_words
 from recorder.reading.items import Message
 from recorder.reading.triplets import event_of
 from recorder.recovering.rebuilt_log import RebuiltLog
-from recorder.recovering.unfinished_log import unfinished_log
+from recorder.recovering.unfinished_log import check_target, unfinished_log
 from recorder.writing.log_writer import LogDescription
 from rig.clocks import UtcNs
 from rig.errors import BadInputError, LogDamagedError
@@ -90,10 +90,7 @@ def merge(first: Path, second: Path, target: Path, progress: Callable[[int], Non
         LogDamagedError: a log was not closed or is damaged.
         StorageError: the disk refuses; nothing of the new log is left.
     """
-    if target.exists():
-        raise BadInputError(f"{target}: exists already and is never overwritten; choose another name")
-    if not target.parent.is_dir():
-        raise BadInputError(f"{target.parent}: no such directory; make it, or choose another one")
+    check_target(target)
     parts = look_at(first), look_at(second)
     check_fit(*parts)
     try:

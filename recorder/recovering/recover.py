@@ -23,6 +23,7 @@ from recorder.reading.triplets import images_of, read_tag, tag_of
 from recorder.recovering.rebuilt_log import RebuiltLog
 from recorder.recovering.scan import Scan, picture_of
 from recorder.recovering.sightings import Chain, Rank, Sighting, chain_of
+from recorder.recovering.unfinished_log import check_target
 from recorder.writing.log_writer import LogDescription
 from rig.errors import BadInputError
 from rig.events import Event, Level
@@ -116,7 +117,7 @@ def recover(source: Path, target: Path, progress: Callable[[int], None] | None =
     done = progress or (lambda _: None)
     was_written = is_being_written(source)
     with LogReader(source, salvage=True) as reader:
-        _check_target(target)
+        check_target(target)
         changes = session_changes(source)
         scan = Scan(reader, lambda position: done(position // 2))
         chain = chain_of(scan.sightings)
@@ -151,14 +152,6 @@ def recover(source: Path, target: Path, progress: Callable[[int], None] | None =
             recovery.findings.lines(),
             was_written,
         )
-
-
-def _check_target(target: Path) -> None:
-    """Say before a long reading, not after it, that the new log cannot be made."""
-    if target.exists():
-        raise BadInputError(f"{target}: exists already and is never overwritten; choose another name")
-    if not target.parent.is_dir():
-        raise BadInputError(f"{target.parent}: no such directory; make it, or choose another one")
 
 
 class _Recovery:

@@ -17,6 +17,18 @@ _UNFINISHED: Final = ".{pid}.part"
 _PROCESS: Final = re.compile(r"\.([0-9]+)\.part$")
 
 
+def check_target(target: Path) -> None:
+    """Say before a long reading, not after it, that the new log cannot be made.
+
+    Raises:
+        BadInputError: there is a file of that name, or no such directory.
+    """
+    if target.exists():
+        raise BadInputError(f"{target}: exists already and is never overwritten; choose another name")
+    if not target.parent.is_dir():
+        raise BadInputError(f"{target.parent}: no such directory; make it, or choose another one")
+
+
 @contextmanager
 def unfinished_log(target: Path, *, replace: bool = False) -> Iterator[Path]:
     """A name beside the target for a log in the making, which gets its own name at the end, all at once.

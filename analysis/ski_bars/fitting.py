@@ -36,7 +36,7 @@ class FittedBars:
     """A pair of skis.
 
     Attributes:
-        poses: as fitted with all images; those of a ski that is not seen as they were expected.
+        poses: fitted in all images; of a ski that is not seen, the expected one.
         covariance: (10, 10) of the poses, see `ExpectedBars`; without that of the cameras.
         shape: (2, 3) bend, tail and tip, m.
         shape_sigma: (2, 3) m.
@@ -67,9 +67,9 @@ def fit_bars(
     Args:
         views: images of one pulse.
         expected: where the skis should be, and how they are shaped.
-        present: which of both there are; the other one is left as it is expected.
+        present: which skis there are; the pose of the other one stays as expected.
         drawn: a person has drawn them: they are there.
-        near: they are expected so nearly that a fit can start from there; no other places and ends are tried.
+        near: the expected poses are near enough to start from; no other places and ends are tried.
     """
     wide = min(_WIDEST_M, _REACH_SIGMAS * float(np.sqrt(np.diagonal(expected.covariance)[[2, 7]].max())))
     ends = expected.shape[:, 1:] + _REACH_SIGMAS * expected.shape_sigma[:, 1:] * (-1, 1)
@@ -160,7 +160,7 @@ def _free(fit: BarFit, found: Estimate) -> Flags:
 
 
 def _other_start(fit: BarFit, expected: ExpectedBars) -> Floats:
-    """The best of some places that may be expected as well, ski by ski."""
+    """The best of several starts around the expected place, ski by ski."""
     root = np.linalg.cholesky(expected.covariance)
     draws = np.random.default_rng(1).normal(size=(_STARTS, SKIS * OF_POSE)) @ root.T
     best = np.zeros(SKIS * OF_POSE)

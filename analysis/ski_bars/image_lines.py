@@ -1,4 +1,4 @@
-"""What each image says by itself of skis that were fitted in all images together.
+"""The lines of single images, for skis that were fitted in all images together.
 
 The measurements of a pulse (`svev-measurements/1`) hold each image by itself, and its errors are taken to be
 independent of those of the other images. So the common fit is not projected into the images. From there on, each image

@@ -1,6 +1,6 @@
 """Seeks both skis in space where no binding is known: from about where the feet are, by the images of all cameras.
 
-What a line in an image tells is that of `directions`. A ski in space, with the place X of its binding and its
+The evidence of a line in an image is that of `directions`. A ski in space, with the place X of its binding and its
 direction d, makes a line in each image; the sum of what these tell, and of the logarithms of the densities of X and d,
 is computed for places on a grid around the feet with directions on another one. The second ski is sought beside the
 first one, which explains what it covers. Pairs of pulses that follow one another differ little: of the best ones of

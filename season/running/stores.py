@@ -148,7 +148,7 @@ def new_result(url: str, options: Options) -> Iterator[Path]:
             _upload(Path(folder), url, options)
         return
     target = Path(result_url(url))
-    # What a worker that was killed has left; one that lost the scheduler and still works on this log fails by it, which
+    # Left by a killed worker. A worker that lost the scheduler and still works on this log fails by this, which
     # is right: its result is not wanted any more.
     for left in left_behind([url]):
         shutil.rmtree(left)

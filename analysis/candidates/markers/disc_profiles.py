@@ -8,7 +8,7 @@ from scipy.special import chndtr
 
 from rig.arrays import Floats
 
-BLUR_PX: Final = 0.62  #: of lens and pixel, typical; what differs is absorbed by the size that was learned with it
+BLUR_PX: Final = 0.62  #: of lens and pixel, typical; the size that is estimated with it absorbs a difference
 _GRID = 0.04  # px, of the table of profiles
 _SIZE_STEP = 0.03  # of the logarithm of the radius, likewise
 

@@ -86,14 +86,14 @@ def follow_further(views: Views, window: Window, flight: Flight, markers: Marker
 
 
 def settled_again(views: Views, window: Window, flight: Flight, markers: Markers) -> Markers:
-    """The markers of a window whose spots have changed, from those before."""
+    """The markers of a window whose spots have changed; the markers before are the start."""
     return _settled(views, window, flight, markers.assigned.xyz, markers.assigned.covariance)
 
 
 def with_bindings(
     window: Window, flight: Flight, markers: Markers, steps: Integers, xyz: Floats, covariance: Floats
 ) -> Markers:
-    """The markers with other places of the bindings, which no spots show.
+    """The markers with bindings at given places, which have no spots.
 
     Args:
         window: t pulses.

@@ -26,7 +26,7 @@ DETECTED = 0.9  #: share of the markers that an image shows which are found as s
 #: By pair of markers, the first one before the second: (options of the first, options of the second).
 Strangeness: TypeAlias = dict[tuple[int, int], Floats]
 
-_LITTLE = 0.03  #: change of a prediction, in its standard deviations, that changes no assignment
+_LITTLE = 0.03  #: standard deviations: a prediction that changes by less keeps its assignment
 MOST_OPTIONS = 5  #: of a marker
 MOST_VAGUE_M = 0.35  #: standard deviation of a prediction that is still of use: less than from binding to binding
 
@@ -51,7 +51,7 @@ class Assigned:
     """The spots of n markers at t pulses.
 
     Attributes:
-        rays: (t, n, m) index of the spot in each image; -1: none, or not to be told.
+        rays: (t, n, m) index of the spot in each image; -1: none, or ambiguous.
         xyz: (t, n, 3) intersection of the rays; NaN where there are not two, or some were ambiguous.
         covariance: (t, n, 3, 3) of it.
     """
@@ -119,7 +119,7 @@ def _same(one: Prediction, other: Prediction) -> Flags:
 
 
 def nothing(m: int) -> Option:
-    """Nothing is found in m images."""
+    """The option that no spot in m images shows the marker."""
     return Option(0.0, np.full(m, -1), -1)
 
 
@@ -233,7 +233,7 @@ def _numbered(counts: Sequence[int]) -> tuple[Integers, Integers]:
 
 
 def _worthy(options: Sequence[Option]) -> list[Option]:
-    """The best options: those that chance does not explain, and no single ray of a spot that a better one has."""
+    """The best options that are likelier than chance; a single ray goes if a better option has its spot."""
     kept: list[Option] = []
     shown: set[tuple[int, int]] = set()
     for option in sorted((o for o in options if o.cost < -DECISIVE), key=lambda o: o.cost):

@@ -27,7 +27,7 @@ class Window:
         points: in space, that these spots may show.
         delivered: (t, m) whether a camera has an image of a pulse.
         late_s: (m,) how much later than the mean of all cameras each one shows the jumper.
-        shift: (t, m, 2) px, what takes the jumper in an image back to the time that all cameras share.
+        shift: (t, m, 2) px, moves the jumper in an image to where he was at the common time.
     """
 
     def __init__(

@@ -5,15 +5,18 @@ import json
 import os
 import re
 import shutil
+import socket
 import subprocess
 import sys
 import tomllib
 import zipfile
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from rig.transport.launcher import program_command, program_environment
 from svev import cli
 from tests.service.serving import serving
 from tests.support.loopback import Loopback
@@ -56,7 +59,7 @@ def test_nothing_else_travels(wheel: set[str]) -> None:
 
 def test_the_command_is_installed() -> None:
     (entry,) = (entry for entry in metadata.entry_points(group="console_scripts") if entry.name == "svev")
-    assert entry.value == "svev.cli:main"
+    assert entry.value == "svev.__main__:main"
 
 
 def _normal(name: str) -> str:
@@ -132,8 +135,13 @@ def shadowed(tmp_path: Path) -> Path:
 
 def _called(folder: Path, *words: str, environment: dict[str, str] | None = None) -> "subprocess.CompletedProcess[str]":
     """Run the installed command in a folder."""
-    command = [str(Path(sys.executable).with_name("svev")), *words]
-    own = {**os.environ, "PYTHONPATH": str(ROOT), **(environment or {})}
+    return _ran(
+        folder, [str(Path(sys.executable).with_name("svev")), *words], {"PYTHONPATH": str(ROOT)} | (environment or {})
+    )
+
+
+def _ran(folder: Path, command: Sequence[str], environment: Mapping[str, str]) -> "subprocess.CompletedProcess[str]":
+    own = {**os.environ, **environment}
     return subprocess.run(command, cwd=folder, env=own, capture_output=True, text=True, timeout=120, check=False)
 
 
@@ -142,6 +150,45 @@ def _called(folder: Path, *words: str, environment: dict[str, str] | None = None
 def test_every_command_starts_beside_files_of_our_names(shadowed: Path, command: str) -> None:
     done = _called(shadowed, command, "--help")
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("start", "path"),
+    [(("svev",), ":/opt"), (("svev",), "/opt:"), (("python", "-m", "svev"), ""), (("python", "-m", "svev"), ":/opt")],
+)
+def test_a_path_that_leads_to_the_present_folder_too_shows_it_last(
+    tmp_path: Path, start: tuple[str, ...], path: str
+) -> None:
+    for name in PACKAGES:
+        if name != "svev":  # after `python -m` that is what was asked for
+            (tmp_path / f"{name}.py").write_text(f'raise SystemExit("{name}.py of the user was imported")\n')
+    command = [str(Path(sys.executable).with_name(start[0])), *start[1:], "info", "--help"]
+    done = _ran(tmp_path, command, {"PYTHONPATH": path})
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def _programs() -> list[str]:
+    """Modules that are run as children; those of `bench` nobody starts beside files of his own."""
+    paths = [path for package in PACKAGES if package != "bench" for path in (ROOT / package).rglob("*.py")]
+    begin = [path for path in paths if re.search(r"^def main\(\) -> None:", path.read_text(), re.MULTILINE)]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in begin]
+    return sorted({*names} - {"rig.transport.launcher_program"})  # it starts the others
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("program", _programs())
+def test_every_program_starts_beside_files_of_our_names(
+    shadowed: Path, monkeypatch: pytest.MonkeyPatch, program: str
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", ":")
+    ours, theirs = socket.socketpair()
+    ours.close()
+    with theirs:
+        done = subprocess.run(
+            [*program_command(program), "child", str(theirs.fileno())], env=program_environment(), cwd=shadowed,
+            pass_fds=[theirs.fileno()], capture_output=True, text=True, timeout=60, check=False,
+        )  # fmt: skip
+    assert done.stderr == "child: no configuration came; this program is started by svev\n"
 
 
 @pytest.mark.long

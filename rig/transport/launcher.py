@@ -234,10 +234,10 @@ def program_command(module: str) -> tuple[str, ...]:
 def program_environment() -> dict[str, str]:
     """The environment of a program of ours: the present one, and the same code as ours wherever we were started.
 
-    Linear algebra runs on one thread: our matrices are small, programs share the processors, and the launcher must have
-    one thread only.
+    An empty entry of PYTHONPATH, which means the present folder, is left out. Linear algebra runs on one thread: our
+    matrices are small, programs share the processors, and the launcher must have one thread only.
     """
-    path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
+    path = os.pathsep.join([_ROOT, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))])
     return {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
 
 

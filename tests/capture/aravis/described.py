@@ -16,9 +16,10 @@ import gi
 
 from capture.aravis.camera import AravisCamera
 from capture.aravis.features import Features
-from rig.clocks import host_now
+from rig.clocks import HostNs, host_now
 from rig.images.pixels import FORMATS
 from rig.settings.model import PacketDelay, RigSettings
+from rig.settings.trigger import ExternalTrigger, Trigger
 from rig.transport.ring import CameraRing
 from simrig.gige.camera import Camera
 from simrig.gige.configuration import CameraConfig
@@ -29,6 +30,8 @@ from tests.support.loopback import Loopback
 gi.require_version("Aravis", "0.8")
 from gi.repository import Aravis, GLib  # noqa: E402  (the version must be required first)
 
+#: Time of a pulse, by which the keys of action commands are made.
+ORIGIN: Final = HostNs(0x12345678)
 _ONES: Final = 0xFFFFFFFF
 _LARGE: Final = 1_000_000
 _NUMBERS: Final = {
@@ -62,13 +65,15 @@ class Described:
         packet_size: int | None = None,
         packet_delay: PacketDelay = "auto",
         set_back: bool = False,
+        trigger: Trigger | None = None,
         **settings: Any,
     ) -> Iterator[AravisCamera]:
-        """The camera, opened by the back end."""
+        """The camera, opened by the back end; by a cable, unless another trigger is named."""
         wanted = self.rig.cameras[0].model_copy(update={"trigger_input": self.input, **settings})
         size = packet_size or self.rig.network.packet_size
         network = self.rig.network.model_copy(update={"packet_size": size, "packet_delay": packet_delay})
-        camera = AravisCamera(wanted, network, self.ring, self.rig.trigger.period_ns, set_back=set_back)
+        by, period_ns = trigger or ExternalTrigger(), self.rig.trigger.period_ns
+        camera = AravisCamera(wanted, network, self.ring, period_ns, by, ORIGIN, set_back=set_back)
         try:
             yield camera
         finally:
@@ -86,6 +91,10 @@ class Described:
                 else:
                     filling.set(name, value)
         registers.made = True
+
+    def has(self, name: str) -> bool:
+        """Whether its description has a feature of this name."""
+        return f'Name="{name}"' in next(iter(self._registers._documents.values())).decode()
 
     def lock(self, address: int, switch: int) -> None:
         """Have the camera refuse to have an address written while there is 0 at another."""

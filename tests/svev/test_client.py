@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -164,11 +164,25 @@ def test_the_example_in_cpp_is_compiled_and_receives_every_triplet(tmp_path: Pat
     program = tmp_path / "triplets"
     flags = ["-std=c++17", "-Wall", "-Wextra", "-Werror"]
     subprocess.run([compiler, *flags, EXAMPLES / "triplets.cpp", "-o", program, "-lzmq"], timeout=120, check=True)
-    written = write_log(tmp_path / "a.mcap", PULSES)
+    _receives_every_triplet([program], tmp_path, loopback)
+
+
+_OCTAVE = shutil.which("octave-cli")
+
+
+@pytest.mark.long
+@pytest.mark.skipif(_OCTAVE is None, reason="no Octave here: apt install octave octave-zeromq")
+def test_the_example_in_octave_receives_every_triplet(tmp_path: Path, loopback: Loopback) -> None:
+    _receives_every_triplet([_OCTAVE or "", "--no-history", EXAMPLES / "triplets.m"], tmp_path, loopback)
+
+
+def _receives_every_triplet(command: Sequence[str | Path], folder: Path, loopback: Loopback) -> None:
+    """Start a program with the address of a replay; it has to print what is in each triplet."""
+    written = write_log(folder / "a.mcap", PULSES)
     options = ReplayOptions(loopback.endpoint(), speed=None)
-    with subprocess.Popen([program, options.address], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen([*command, options.address], stdout=subprocess.PIPE, text=True) as process:
         try:
-            with _replaying(tmp_path / "a.mcap", options):
+            with _replaying(folder / "a.mcap", options):
                 assert process.stdout is not None
                 lines = [process.stdout.readline().rstrip("\n") for _ in written]
         finally:

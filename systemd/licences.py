@@ -1,12 +1,13 @@
 """Collects the licences of all wheels of a bundle, and says under which terms the whole stands: licences.py BUNDLE.
 
-A wheel may hold libraries of others that its own licence does not name (`*.libs/`). Some of them are under the GPL
-(x264, x265), and so is then the whole that is passed on. A wheel without the text of its licence gets the common one,
-with its author above.
+A wheel may hold libraries of others (`*.libs/`). Some of them are under the GPL (x264, x265), and so is then the whole
+that is passed on. Of libraries that the wheel's own texts do not name, licence, copyright and texts are added by the
+table `licence-texts/libraries.toml`. A wheel without the text of its licence gets the common one, with its author.
 """
 
 import re
 import sys
+import tomllib
 import zipfile
 from email.message import Message
 from email.parser import HeaderParser
@@ -21,13 +22,15 @@ _TAG = re.compile(rb"SPDX-License-Identifier: *([A-Za-z0-9.-]+)")
 #: Classifiers that name one licence alone.
 _CLASSIFIED = {"MIT License": "MIT", "MIT": "MIT"}
 COMMON = Path(__file__).parent / "licence-texts"
-#: Where Debian keeps the text.
-GPL = Path("/usr/share/common-licenses/GPL-3")
+#: Where Debian keeps texts.
+DEBIAN = Path("/usr/share/common-licenses")
+_LIBRARIES = tomllib.loads((COMMON / "libraries.toml").read_text(encoding="utf-8"))
 
 _TERMS = """This archive as a whole may be passed on under the GNU General Public License, version 3 or later
 (licences/GPL-3), because it holds libraries under the GPL: {}.
 Their sources: https://www.videolan.org/developers/x264.html, https://www.videolan.org/developers/x265.html,
-https://ffmpeg.org; how they were built: https://github.com/PyAV-Org/pyav-ffmpeg.
+https://ffmpeg.org; how they and the other libraries beside them were built, and from what:
+https://github.com/PyAV-Org/pyav-ffmpeg.
 Whoever passes the archive on offers these sources too.
 Svev itself stays under its BSD licence, and each package under its own."""
 
@@ -35,16 +38,18 @@ Svev itself stays under its BSD licence, and each package under its own."""
 def main(bundle: Path) -> None:
     """Write LICENCES.txt and the folder `licences` of a bundle."""
     rows, copyleft = [], []
+    folder = bundle / "licences"
     for path in sorted((bundle / "wheels").glob("*.whl")):
         with zipfile.ZipFile(path) as wheel:
-            name, row = _row(wheel, bundle / "licences")
+            name, row = _row(wheel, folder)
             inside = sorted(
                 {found[1] for each in wheel.namelist() if ".libs/" in each and (found := _LIBRARY.search(each))}
             )
+        _add_libraries(name, inside, folder)
         rows.append(row + (f"\n    libraries of others inside: {', '.join(inside)}" if inside else ""))
         copyleft += [f"{library} in {name}" for library in inside if library.startswith(COPYLEFT)]
     if copyleft:
-        (bundle / "licences" / "GPL-3").write_bytes(GPL.read_bytes())
+        _add_text("GPL-3", folder)
         terms = _TERMS.format(", ".join(copyleft))
     else:
         terms = "No library under the GPL was found in it: each package stands under its own licence, Svev under BSD."
@@ -65,6 +70,36 @@ def _row(wheel: zipfile.ZipFile, folder: Path) -> tuple[str, str]:
     if not texts:
         (place / "LICENCE").write_text(_common(wheel, fields, name), encoding="utf-8")
     return name, f"{name}: {_stated(fields)}" + ("" if texts else " (the wheel holds no text; the common one is added)")
+
+
+def _add_libraries(wheel: str, libraries: list[str], folder: Path) -> None:
+    """Add licence, copyright and texts of the libraries in a wheel that its own texts do not name."""
+    place = folder / wheel.replace(" ", "-")
+    own = "".join(
+        f"{each.name}\n{each.read_text(encoding='utf-8', errors='replace')}" for each in place.iterdir()
+    ).lower()
+    lines, texts = [], set[str]()
+    for library in libraries:
+        beginning = max((each for each in _LIBRARIES if library.startswith(each)), key=len, default=library)
+        known = _LIBRARIES.get(beginning, {})
+        word = known.get("word", beginning.removeprefix("lib")).lower()
+        if re.search(rf"(?<![a-z])(lib)?{word}(?![a-z])", own):
+            continue
+        if "licence" not in known:
+            sys.exit(f"{wheel} holds {library}, which its texts do not name: add it to {COMMON / 'libraries.toml'}")
+        lines.append(f"{library}: {known['licence']}, copyright (c) {known['copyright']}\n")
+        texts.update(known["texts"])
+    for text in sorted(texts):
+        _add_text(text, folder)
+    if lines:
+        head = f"Libraries of others inside {wheel}; the texts of their licences are in the folder above.\n\n"
+        (place / "LIBRARIES").write_text(head + "".join(lines), encoding="utf-8")
+
+
+def _add_text(name: str, folder: Path) -> None:
+    """Add the common text of a licence, ours or Debian's."""
+    ours = COMMON / name
+    (folder / name).write_bytes((ours if ours.is_file() else DEBIAN / name).read_bytes())
 
 
 def _common(wheel: zipfile.ZipFile, fields: Message, name: str) -> str:

@@ -2,6 +2,7 @@
 
 import runpy
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -76,3 +77,31 @@ def test_a_library_under_the_gpl_decides_for_the_whole(bundle: Path, monkeypatch
     assert "libx264 in av 1.0" in said
     assert "libraries of others inside: libopus, libx264" in said
     assert "GNU GENERAL PUBLIC LICENSE" in (bundle / "licences" / "GPL-3").read_text()
+    added = (bundle / "licences" / "av-1.0" / "LIBRARIES").read_text()
+    assert "libopus: BSD-3-Clause, copyright (c) 2001-2023 Xiph.Org" in added
+    assert "libx264: GPL-2.0-or-later" in added
+    assert "Neither the name" in (bundle / "licences" / "BSD-3-Clause").read_text()
+
+
+def test_libraries_that_a_wheel_names_itself_need_nothing_more(bundle: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    inside = ("fast.libs/libscipy_openblas64_-1.so", "fast.libs/libgfortran-2.so.5")
+    _wheel(bundle, "fast", "License: BSD", "fast-1.0.dist-info/licenses/LICENSE-openblas-gfortran.txt", *inside)
+    _said(bundle, monkeypatch)
+    assert not (bundle / "licences" / "fast-1.0" / "LIBRARIES").exists()
+
+
+@pytest.mark.parametrize("library", ["libunheard-1.so", "libssl-1.so.1"])
+def test_a_library_of_which_no_licence_is_known_stops_the_bundle(
+    bundle: Path, monkeypatch: pytest.MonkeyPatch, library: str
+) -> None:
+    _wheel(bundle, "fast", "License: BSD", "fast-1.0.dist-info/licenses/LICENSE", f"fast.libs/{library}")
+    with pytest.raises(SystemExit, match=r"fast 1\.0 holds lib\w+, which its texts do not name: add it to"):
+        _said(bundle, monkeypatch)
+
+
+def test_every_text_that_the_table_of_libraries_names_is_there() -> None:
+    libraries = tomllib.loads((SYSTEMD / "licence-texts" / "libraries.toml").read_text())
+    places = (SYSTEMD / "licence-texts", Path("/usr/share/common-licenses"))
+    for known in libraries.values():
+        for text in known.get("texts", ()):
+            assert any((place / text).is_file() for place in places), text

@@ -89,10 +89,10 @@ client-tool: system ## for the test that makes a client of the REST API: openapi
 	@test -x build/client-tool/bin/openapi-python-client || { /usr/bin/python3 -m venv build/client-tool && \
 	  build/client-tool/bin/pip install -qq openapi-python-client; }
 
-readers: setup ## for the tests that have our files read by the programs that they are for, beside Svev's environment
-	@test -e build/readers/.with-duckdb || { $(PIP) install -qq --no-deps --upgrade --target build/readers pycolmap==4.2.1 caliscope==0.11.8 \
+readers: setup ## for tests in which our files are read by the programs that they are for, beside Svev's environment
+	@test -e build/readers/.with-opensim || { $(PIP) install -qq --no-deps --upgrade --target build/readers pycolmap==4.2.1 caliscope==0.11.8 \
 	  Pose2Sim==0.10.49 anytree rtoml platformdirs matplotlib contourpy cycler fonttools kiwisolver packaging pyparsing \
-	  duckdb==1.5.5 duckdb-extension-sqlite-scanner==1.5.5 && touch build/readers/.with-duckdb; }
+	  duckdb==1.5.5 duckdb-extension-sqlite-scanner==1.5.5 opensim==4.6 && touch build/readers/.with-opensim; }
 
 docs: setup $(DOCS) ## the documentation as a site in build/site, with search; a link that leads nowhere is an error
 	@$(BIN)/python -m tests.support.rest_description build/docs/openapi.json

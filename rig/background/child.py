@@ -15,6 +15,8 @@ from rig.transport.process_table import Child, ProcessSpec
 #: So long a program may go on after a recording has begun: two pulses at 100 Hz.
 _LOOK_S: Final = 0.02
 _NICE: Final = 19
+#: One that gets only the processor time that nobody else wants needs some even to end.
+_GONE_S: Final = 60.0
 
 
 def run_child(
@@ -61,7 +63,7 @@ def run_child(
             os.sched_setscheduler(child.pid, os.SCHED_IDLE, os.sched_param(0))
         return _followed(child, brake, wanted, tell)
     finally:
-        child.kill()
+        child.kill(_GONE_S)
 
 
 class _Brake:

@@ -121,10 +121,10 @@ class Child:
             return False
         return True
 
-    def kill(self) -> None:
-        """End it now and close the channel."""
+    def kill(self, patience_s: float = _KILLED_S) -> None:
+        """End it now, wait at most `patience_s` seconds until it is gone, and close the channel."""
         self._process.kill()
-        self.wait(_KILLED_S)
+        self.wait(patience_s)
         self.control.close()
 
     def stop(self, timeout_s: float) -> bool:
